@@ -1,0 +1,165 @@
+"""A path through strain: the frames and the series that a run leaves.
+
+:class:`Run` is what :func:`granufab.run` returns and what :func:`granufab.read` gives back from
+a run file, so measures and figures need not know which of the two they hold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+import xarray as xr
+
+from granufab.packing import Array, Packing
+
+__all__ = ["SERIES_UNITS", "Frame", "FrameSource", "Recorder", "Run", "StepStatistics"]
+
+SERIES_UNITS: dict[str, tuple[str, str]] = {
+    "eps_q": ("-", "deviatoric strain, running"),
+    "eps_q_total": ("-", "deviatoric strain, accumulated"),
+    "z": ("-", "coordination number, all grains"),
+    "z_backbone": ("-", "coordination number without rattlers"),
+    "z_mechanical": ("-", "mechanical coordination number"),
+    "rattler_fraction": ("-", "fraction of rattlers"),
+    "a": ("-", "fabric anisotropy"),
+    "a_signed": ("-", "signed fabric anisotropy"),
+    "theta_c": ("degree", "major direction of the fabric"),
+    "q_over_p": ("-", "stress ratio"),
+    "phi": ("-", "solid fraction"),
+    "p": ("stress", "mean stress"),
+    "residual": ("-", "largest solver residual since the last row"),
+    "sweeps": ("-", "mean sweeps per step since the last row"),
+    "overlap": ("mean diameter", "worst overlap since the last row"),
+    "inertial_number": ("-", "inertial number"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepStatistics:
+    """How well the steps since the last record were solved.
+
+    Attributes:
+        steps: number of steps.
+        nonconverged: steps that ended above the tolerance.
+        sweeps: mean sweeps per step.
+        residual: largest residual [-].
+        residual_contact: largest single contact's share of it [-].
+        violation: worst max(0, −ũ_n)·h / d [-].
+        overlap: worst overlap [mean diameters].
+        kinetic_ratio: kinetic energy / (p V) [-].
+        pressure_error: worst |p − wanted| / wanted on the stress-driven components [-].
+        contact_updates: local solves done.
+        seconds: wall time [s].
+    """
+
+    steps: int = 0
+    nonconverged: int = 0
+    sweeps: float = 0.0
+    residual: float = 0.0
+    residual_contact: float = 0.0
+    violation: float = 0.0
+    overlap: float = 0.0
+    kinetic_ratio: float = 0.0
+    pressure_error: float = 0.0
+    contact_updates: int = 0
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Frame:
+    """A recorded state on a path.
+
+    Attributes:
+        packing: the state; its contacts are all pairs within the recording reach.
+        eps_q: running deviatoric strain along the first stage's direction [-].
+        eps_q_total: ∫|dε_q| [-].
+        strain: accumulated logarithmic strain tensor, compression positive, shape (D, D).
+        stage: index of the stage on the path.
+        stress: contact stress, compression positive [N/m^(D−1)], shape (D, D).
+        inertial_number: I of the imposed rate [-].
+        direction: contraction axis of the first stage, unit vector, shape (D,).
+        statistics: of the steps since the previous record.
+        remap: accumulated integer lattice change of a sheared cell, shape (D, D).
+    """
+
+    packing: Packing
+    eps_q: float
+    eps_q_total: float
+    strain: Array
+    stage: int
+    stress: Array
+    inertial_number: float
+    direction: Array
+    statistics: StepStatistics = StepStatistics()
+    remap: Array | None = None
+
+
+class FrameSource(Protocol):
+    """A lazy sequence of frames."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, index: int, /) -> Frame: ...
+
+
+@runtime_checkable
+class Recorder(Protocol):
+    """What :func:`granufab.run` calls while it runs; ``series`` rows are more frequent."""
+
+    def frame(self, frame: Frame) -> None:
+        """Receive a complete state."""
+        ...
+
+    def row(self, row: Mapping[str, float]) -> None:
+        """Receive one row of the series (keys: :data:`SERIES_UNITS` and ``path``)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Run:
+    """Frames, series and summary of one path.
+
+    Attributes:
+        series: xarray Dataset over dimension ``record``; variables as :data:`SERIES_UNITS`.
+        frames: recorded states, lazy where they lie in a file.
+        settings: resolved settings as plain data.
+        summary: solver figures and reached values as plain data.
+        name: the path's name.
+    """
+
+    series: xr.Dataset
+    frames: FrameSource | Sequence[Frame]
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    summary: Mapping[str, Any] = field(default_factory=dict)
+    name: str = "run"
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.frames[0].packing.dimension
+
+    def packings(self) -> Iterator[Packing]:
+        """The states alone, one after another."""
+        for index in range(len(self.frames)):
+            yield self.frames[index].packing
+
+
+def series_dataset(rows: Sequence[Mapping[str, float]], attributes: Mapping[str, Any]) -> xr.Dataset:
+    """Rows of a series as a Dataset with units and definitions.
+
+    Args:
+        rows: mappings with the keys of :data:`SERIES_UNITS` (others are kept without units).
+        attributes: criterion, z_definition and other provenance.
+    """
+    names = list(rows[0]) if rows else list(SERIES_UNITS)
+    data = {}
+    for name in names:
+        if name == "path":
+            continue
+        unit, text = SERIES_UNITS.get(name, ("-", name))
+        values = np.array([row[name] for row in rows], dtype=float)
+        data[name] = ("record", values, {"units": unit, "long_name": text})
+    return xr.Dataset(data, attrs=dict(attributes))
