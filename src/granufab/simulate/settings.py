@@ -1,0 +1,312 @@
+"""Settings of a simulated case: frozen, validated, mirrored one to one by its TOML file.
+
+Units are free: with the defaults d = p = density = 1 every result is in those scales; in SI give
+diameter in m, density in kg/m³ (2D: kg/m² of disk area), pressure in Pa (2D: N/m).
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from granufab.errors import InvalidSettings
+
+__all__ = [
+    "Case",
+    "Material",
+    "Record",
+    "Sample",
+    "Sizes",
+    "Solver",
+    "Stage",
+    "load_case",
+    "parse_case",
+    "to_toml",
+]
+
+ZDefinition = Literal["z", "z_backbone", "z_mechanical"]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class _Settings(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+
+
+class Sizes(_Settings):
+    """Grain sizes: diameters with mean ``Sample.diameter``."""
+
+    kind: Literal[
+        "uniform", "uniform-by-volume", "bidisperse", "log-normal", "monodisperse", "file"
+    ] = Field("uniform", description="distribution of diameters")
+    spread: NonNegative = Field(
+        0.2, description="uniform: half width / mean; log-normal: standard deviation of ln d"
+    )
+    ratio: Positive = Field(1.4, description="bidisperse: large / small diameter")
+    large_fraction: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.5, description="bidisperse: number fraction of large grains"
+    )
+    file: str | None = Field(None, description="file of radii, one per line, used in order")
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.kind in ("uniform", "uniform-by-volume") and self.spread >= 1:
+            raise ValueError(f"spread must be below 1 for {self.kind} sizes, got {self.spread}")
+        if self.kind == "file" and self.file is None:
+            raise ValueError("kind 'file' needs file = \"radii.txt\"")
+        return self
+
+
+class Sample(_Settings):
+    """How the isotropic starting sample is made."""
+
+    grain_count: Annotated[int, Field(ge=1, le=100_000_000)] = Field(
+        2000, description="number of grains"
+    )
+    dimension: Literal[2, 3] = Field(2, description="2 (disks) or 3 (spheres)")
+    sizes: Sizes = Sizes()
+    diameter: Positive = Field(1.0, description="mean diameter d")
+    density: Positive = Field(1.0, description="mass per area (2D) or volume (3D) of a grain")
+    pressure: Positive = Field(1.0, description="confining stress p")
+    coordination: Positive | None = Field(
+        None, description="wanted z_0, reached by bisecting the compaction friction"
+    )
+    coordination_tolerance: Positive = Field(0.03, description="accepted |z_0 - wanted|")
+    z_definition: ZDefinition = Field("z_backbone", description="which z is meant")
+    friction: NonNegative = Field(
+        0.0, description="compaction friction where no coordination is wanted"
+    )
+    solid_fraction: Annotated[float, Field(gt=0, lt=0.7)] = Field(
+        0.45, description="of the dilute random start"
+    )
+    boundary: Literal["periodic", "walls"] = Field("periodic", description="periodic or walls")
+    file: str | None = Field(None, description="start from the last frame of this run file")
+    seed: Annotated[int, Field(ge=0)] = Field(1, description="random seed")
+
+
+class Material(_Settings):
+    """Contact law of the grains while the path is followed."""
+
+    friction: NonNegative = Field(0.4, description="friction coefficient mu between grains")
+    wall_friction: NonNegative = Field(0.0, description="friction coefficient on walls")
+    restitution: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.0, description="normal restitution coefficient e"
+    )
+
+
+class Solver(_Settings):
+    """Contact Dynamics solver."""
+
+    tolerance: Annotated[float, Field(gt=0, lt=1)] = Field(
+        1e-4, description="residual at which a step is converged"
+    )
+    max_sweeps: Annotated[int, Field(ge=1)] = Field(
+        2000, description="sweeps after which a step is counted as not converged"
+    )
+    stiffness: Annotated[float, Field(gt=0)] = Field(
+        5e4, description="implicit contact stiffness k/p (3D: k/(p d)); inf is rigid"
+    )
+    momentum: bool = Field(True, description="accelerate the sweeps by safeguarded momentum")
+    strict: bool = Field(False, description="a step that does not converge is an error")
+    overlap_correction: Annotated[float, Field(ge=0, le=0.1)] = Field(
+        0.05, description="share beta of an overlap removed per step (rigid contacts)"
+    )
+    time_step: Positive = Field(
+        0.2, description="largest time step in sqrt(m/p) (2D) or sqrt(m/(p d)) (3D)"
+    )
+    step_strain: Annotated[float, Field(gt=0, le=1e-2)] = Field(
+        1e-4, description="largest strain per step"
+    )
+    skin: Annotated[float, Field(gt=0, le=1)] = Field(
+        0.1, description="neighbour-list margin in mean diameters"
+    )
+
+
+class Stage(_Settings):
+    """One stage of the loading path."""
+
+    loading: Literal[
+        "isotropic", "constant-mean", "biaxial", "simple-shear", "simple-shear-volume"
+    ] = Field("constant-mean", description="which cell components are rate- and stress-driven")
+    strain: float = Field(
+        0.3, description="deviatoric strain of this stage; negative reverses; isotropic: compaction"
+    )
+    inertial_number: Positive | None = Field(
+        1e-3, description="I = rate sqrt(m/p) (2D), rate d sqrt(density/p) (3D); sets the rate"
+    )
+    rate: Positive | None = Field(None, description="deviatoric rate instead of inertial_number")
+    axis: Annotated[int, Field(ge=0, le=2)] = Field(
+        1, description="compression axis (constant-mean, biaxial), gradient axis (simple shear)"
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if not math.isfinite(self.strain):
+            raise ValueError(f"strain must be finite, got {self.strain}")
+        if self.inertial_number is None and self.rate is None:
+            raise ValueError("give inertial_number or rate")
+        return self
+
+
+class Record(_Settings):
+    """What is written while a path runs."""
+
+    series_interval: Positive = Field(1e-3, description="strain between rows of the series")
+    frame_interval: Positive = Field(1e-2, description="strain between complete frames")
+    reach: NonNegative = Field(
+        0.05, description="pairs up to this gap are recorded, in mean diameters"
+    )
+    criterion: str = Field("force", description="contact criterion: force, gap:DELTA or listed")
+    z_definition: ZDefinition = Field("z_backbone", description="definition of z on figures")
+
+
+class Case(_Settings):
+    """A complete case: sample, material, solver, path, record."""
+
+    schema_version: Literal[1] = 1
+    name: str = Field("run", description="name of the path in series and figures")
+    sample: Sample = Sample()
+    material: Material = Material()
+    solver: Solver = Solver()
+    path: tuple[Stage, ...] = (Stage(),)
+    record: Record = Record()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        for index, stage in enumerate(self.path):
+            if stage.axis >= self.sample.dimension:
+                raise ValueError(
+                    f"path.{index}.axis is {stage.axis}, allowed 0..{self.sample.dimension - 1}"
+                )
+            if self.sample.boundary == "walls" and stage.loading.startswith("simple-shear"):
+                raise ValueError(f"path.{index}.loading is {stage.loading}, which needs a "
+                                 "periodic sample")
+        return self
+
+
+def load_case(path: Path | str, overrides: tuple[str, ...] = ()) -> Case:
+    """Read a case from a TOML file.
+
+    Args:
+        path: the file.
+        overrides: assignments ``section.key=value`` that win over the file.
+    Raises:
+        InvalidSettings: the file is missing, is no TOML, or holds a bad value.
+    """
+    path = Path(path)
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InvalidSettings(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InvalidSettings(f"{path}: cannot be read ({error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidSettings(f"{path}: not valid TOML: {error}") from None
+    for text in overrides:
+        _assign(data, text)
+    return parse_case(data, where=str(path))
+
+
+def parse_case(data: dict[str, Any], *, where: str = "settings") -> Case:
+    """Validate plain data into a :class:`Case`.
+
+    Raises:
+        InvalidSettings: names the key, the value got and what is allowed.
+    """
+    try:
+        return Case.model_validate(data)
+    except ValidationError as error:
+        raise InvalidSettings(f"{where}: {_describe(error)}") from None
+
+
+def _assign(data: dict[str, Any], text: str) -> None:
+    key, equals, value = text.partition("=")
+    if not equals:
+        raise InvalidSettings(f"--set {text}: expected section.key=value")
+    try:
+        parsed = tomllib.loads(f"x = {value}")["x"]
+    except tomllib.TOMLDecodeError:
+        parsed = value
+    *sections, last = key.strip().split(".")
+    target: Any = data
+    for section in sections:
+        if isinstance(target, list):
+            if not section.isdigit() or int(section) >= len(target):
+                raise InvalidSettings(f"--set {text}: there is no entry {section}")
+            target = target[int(section)]
+        else:
+            target = target.setdefault(section, [] if section == "path" else {})
+        if not isinstance(target, dict | list):
+            raise InvalidSettings(f"--set {text}: {section} is a value, not a section")
+    if isinstance(target, list):
+        raise InvalidSettings(f"--set {text}: name the stage, for example path.0.{last}")
+    target[last] = parsed
+
+
+def _describe(error: ValidationError) -> str:
+    first = error.errors()[0]
+    location = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        known = _known_names(first["loc"])
+        near = difflib.get_close_matches(str(first["loc"][-1]), known, n=1, cutoff=0.0)
+        hint = f"; did you mean {near[0]}?" if near else ""
+        return f"unknown key {location}{hint} (known: {', '.join(known)})"
+    message = first["msg"].removeprefix("Value error, ")
+    got = "" if first["type"] == "value_error" else f", got {first['input']!r}"
+    return f"{location}: {message}{got}" if location else message
+
+
+def _known_names(location: tuple[int | str, ...]) -> list[str]:
+    model: Any = Case
+    for part in location[:-1]:
+        if isinstance(part, int):
+            continue
+        annotation = model.model_fields[part].annotation
+        model = Stage if part == "path" else annotation
+    return list(model.model_fields)
+
+
+def to_toml(case: Case, *, comments: bool = False) -> str:
+    """A case as TOML text; with ``comments`` each key carries its meaning."""
+    lines = [f"schema_version = {case.schema_version}", f"name = {_value(case.name)}"]
+    for section in ("sample", "material", "solver", "record"):
+        _section(lines, f"[{section}]", getattr(case, section), comments, section)
+    for stage in case.path:
+        _section(lines, "[[path]]", stage, comments, "path")
+    return "\n".join(lines) + "\n"
+
+
+def _section(
+    lines: list[str], header: str, model: _Settings, comments: bool, prefix: str
+) -> None:
+    lines += ["", header]
+    nested: list[tuple[str, _Settings]] = []
+    for name, info in type(model).model_fields.items():
+        value = getattr(model, name)
+        if isinstance(value, _Settings):
+            nested.append((name, value))
+            continue
+        note = f"  # {info.description}" if comments and info.description else ""
+        if value is None:
+            if comments:
+                lines.append(f"# {name} ={note}")
+        else:
+            lines.append(f"{name} = {_value(value)}{note}")
+    for name, value in nested:
+        _section(lines, f"[{prefix}.{name}]", value, comments, f"{prefix}.{name}")
+
+
+def _value(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float):
+        return repr(value) if math.isfinite(value) else ("inf" if value > 0 else "-inf")
+    if isinstance(value, int):
+        return str(value)
+    text = str(value).replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{text}"'
