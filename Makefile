@@ -1,0 +1,25 @@
+PYTHON ?= python
+
+.PHONY: check test slow bench docs format
+
+check:
+	$(PYTHON) -m ruff check src tests
+	$(PYTHON) -m ruff format --check src tests
+	$(PYTHON) -m pyright
+	lint-imports
+
+test:
+	$(PYTHON) -m pytest
+
+slow:
+	$(PYTHON) -m pytest -m slow
+
+bench:
+	@for script in benchmarks/*.py; do echo "$$script"; $(PYTHON) "$$script" || exit 1; done
+
+docs:
+	$(PYTHON) docs/write_api.py
+
+format:
+	$(PYTHON) -m ruff format src tests
+	$(PYTHON) -m ruff check --fix src tests
