@@ -1,0 +1,1 @@
+"""Numba kernels on numbers and arrays. Read ``contact_law`` first; only ``vectors`` knows D."""

@@ -1,0 +1,200 @@
+"""Pairs of grains within a distance, in a periodic, sheared or walled cell; and their order.
+
+Grains are sorted into bins of fractional coordinates, so a tilted cell needs nothing special.
+Positions are not wrapped: each pair carries the integer lattice shift (image) with which
+r_j + C·image − r_i is the branch.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from granufab.kernels.options import kernel
+
+__all__ = ["bin_counts", "conflict_free_order", "find_pairs", "find_wall_pairs", "morton_order"]
+
+
+@kernel
+def bin_counts(inverse, reach, periodic):
+    """Bins per axis so that a bin is at least ``reach`` wide; 1 where fewer than 3 would fit."""
+    dimension = len(inverse)
+    counts = np.ones(dimension, np.int64)
+    for k in range(dimension):
+        square = 0.0
+        for l in range(dimension):
+            square += inverse[k, l] ** 2
+        number = int(1.0 / (np.sqrt(square) * reach))
+        counts[k] = number if number >= (3 if periodic[k] else 1) else 1
+    return counts
+
+
+@kernel
+def _sort_into_bins(position, origin, inverse, periodic, counts):
+    count, dimension = position.shape
+    total = 1
+    for k in range(dimension):
+        total *= counts[k]
+    where = np.empty((count, dimension), np.int64)
+    shift = np.zeros((count, dimension), np.int64)
+    start = np.zeros(total + 1, np.int64)
+    flat = np.empty(count, np.int64)
+    for i in range(count):
+        index = 0
+        for k in range(dimension):
+            s = 0.0
+            for l in range(dimension):
+                s += inverse[k, l] * (position[i, l] - origin[l])
+            if periodic[k]:
+                whole = np.floor(s)
+                shift[i, k] = int(whole)
+                s -= whole
+            place = min(max(int(s * counts[k]), 0), counts[k] - 1)
+            where[i, k] = place
+            index = index * counts[k] + place
+        flat[i] = index
+        start[index + 1] += 1
+    for b in range(total):
+        start[b + 1] += start[b]
+    items = np.empty(count, np.int64)
+    fill = start.copy()
+    for i in range(count):
+        items[fill[flat[i]]] = i
+        fill[flat[i]] += 1
+    return where, shift, start, items
+
+
+@kernel
+def find_pairs(position, radius, matrix, inverse, origin, periodic, skin, capacity):
+    """All pairs i < j with surface distance below ``skin``.
+
+    Returns:
+        pairs (count, 2), images (count, D), and the count; if it exceeds ``capacity`` the arrays
+        are cut there and the caller asks again with more room.
+    """
+    count, dimension = position.shape
+    largest = 0.0
+    for i in range(count):
+        largest = max(largest, radius[i])
+    counts = bin_counts(inverse, 2.0 * largest + skin, periodic)
+    where, shift, start, items = _sort_into_bins(position, origin, inverse, periodic, counts)
+    pairs = np.empty((capacity, 2), np.int32)
+    images = np.empty((capacity, dimension), np.int32)
+    found = 0
+    image = np.zeros(dimension, np.int64)
+    neighbours = 3**dimension
+    for i in range(count):
+        for code in range(neighbours):
+            rest = code
+            index = 0
+            outside = False
+            for k in range(dimension):
+                offset = rest % 3 - 1
+                rest //= 3
+                place = where[i, k] + offset
+                wraps = 0
+                if place < 0 or place >= counts[k]:
+                    if not periodic[k]:
+                        outside = True
+                    wraps = -1 if place < 0 else 1
+                    place -= wraps * counts[k]
+                image[k] = wraps
+                index = index * counts[k] + place
+            if outside:
+                continue
+            for at in range(start[index], start[index + 1]):
+                j = items[at]
+                if j <= i:
+                    continue
+                square = 0.0
+                for k in range(dimension):
+                    x = position[j, k] - position[i, k]
+                    for l in range(dimension):
+                        x += matrix[k, l] * (image[l] + shift[i, l] - shift[j, l])
+                    square += x * x
+                reach = radius[i] + radius[j] + skin
+                if square < reach * reach:
+                    if found < capacity:
+                        pairs[found, 0] = i
+                        pairs[found, 1] = j
+                        for k in range(dimension):
+                            images[found, k] = image[k] + shift[i, k] - shift[j, k]
+                    found += 1
+    return pairs, images, found
+
+
+@kernel
+def find_wall_pairs(position, radius, matrix, origin, periodic, skin, capacity):
+    """Pairs of a grain and a flat wall 2·axis + side within ``skin``; as (pairs, count)."""
+    count, dimension = position.shape
+    pairs = np.empty((capacity, 2), np.int32)
+    found = 0
+    for i in range(count):
+        for k in range(dimension):
+            if periodic[k]:
+                continue
+            low = position[i, k] - origin[k] - radius[i]
+            high = origin[k] + matrix[k, k] - position[i, k] - radius[i]
+            for side in range(2):
+                if (low if side == 0 else high) < skin:
+                    if found < capacity:
+                        pairs[found, 0] = i
+                        pairs[found, 1] = 2 * k + side
+                    found += 1
+    return pairs, found
+
+
+@kernel
+def morton_order(position, origin, inverse):
+    """Order of grains along a Z-curve through the cell: neighbours lie near in memory."""
+    count, dimension = position.shape
+    bits = 20 if dimension == 3 else 30
+    keys = np.zeros(count, np.int64)
+    for i in range(count):
+        for k in range(dimension):
+            s = 0.0
+            for l in range(dimension):
+                s += inverse[k, l] * (position[i, l] - origin[l])
+            place = int((s - np.floor(s)) * 2.0**bits)
+            for bit in range(bits):
+                keys[i] |= ((place >> bit) & 1) << (bit * dimension + k)
+    return np.argsort(keys)
+
+
+@kernel
+def conflict_free_order(first, second, body_count, batch, window):
+    """Reorder contacts so that runs of ``batch`` share no body, chosen from a sliding window.
+
+    Successive updates are then independent and the processor overlaps them. Greedy: the next
+    contact is the first in the window that touches no body of the current batch, else the first.
+    """
+    count = len(first)
+    order = np.empty(count, np.int64)
+    waiting = np.empty(window, np.int64)
+    stamp = np.full(body_count, -1, np.int64)
+    filled, taken, made, current, in_batch = 0, 0, 0, 0, 0
+    while made < count:
+        while filled < window and taken < count:
+            waiting[filled] = taken
+            filled += 1
+            taken += 1
+        chosen = -1
+        for w in range(filled):
+            c = waiting[w]
+            if stamp[first[c]] != current and stamp[second[c]] != current:
+                chosen = w
+                break
+        if chosen < 0 or in_batch == batch:
+            current += 1
+            in_batch = 0
+            if chosen < 0:
+                chosen = 0
+        c = waiting[chosen]
+        order[made] = c
+        made += 1
+        in_batch += 1
+        stamp[first[c]] = current
+        stamp[second[c]] = current
+        for w in range(chosen, filled - 1):
+            waiting[w] = waiting[w + 1]
+        filled -= 1
+    return order

@@ -1,0 +1,389 @@
+"""Small vectors as tuples: the only file that knows the dimension.
+
+A vector is a tuple of D floats; a spin, and whatever lies in the tangent plane, is a 1-tuple in
+2D (component along t = (−n_y, n_x)) and a 3-tuple in 3D (global axes, perpendicular to n). The
+length of the tuple is part of its type, so one kernel text compiles to hand-written 2D and 3D
+code; ``like`` arguments carry the dimension into loads. Each function exists as plain Python
+(used with the JIT off) and as a compiled overload that picks its text by tuple length.
+
+Bodies are rows of ``motion``: (v_x, v_y, s, 1/m) in 2D, (v, s, 1/m, 0) in 3D, where s = R·ω.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from numba.extending import overload
+
+from granufab.kernels.options import ARITHMETIC
+
+__all__ = [
+    "add",
+    "add_outer",
+    "axpy",
+    "cell_weight",
+    "compose",
+    "dot",
+    "inverse_mass",
+    "load",
+    "load_tangent",
+    "matvec",
+    "moment",
+    "norm",
+    "norm2",
+    "scale",
+    "slip",
+    "spin",
+    "store",
+    "store_spin",
+    "sub",
+    "tangential",
+]
+
+_OPTIONS: dict[str, Any] = {"jit_options": ARITHMETIC}
+
+
+def _choose(vector: Any, two: Any, three: Any, one: Any = None) -> Any:
+    return {1: one, 2: two, 3: three}[getattr(vector, "count", None) or len(vector)]
+
+
+def dot(a, b):
+    """Scalar product."""
+    return sum(x * y for x, y in zip(a, b, strict=True))
+
+
+@overload(dot, **_OPTIONS)
+def _dot(a, b):
+    return _choose(
+        a,
+        lambda a, b: a[0] * b[0] + a[1] * b[1],
+        lambda a, b: a[0] * b[0] + a[1] * b[1] + a[2] * b[2],
+        lambda a, b: a[0] * b[0],
+    )
+
+
+def norm2(a):
+    """Squared length."""
+    return dot(a, a)
+
+
+@overload(norm2, **_OPTIONS)
+def _norm2(a):
+    return lambda a: dot(a, a)
+
+
+def norm(a):
+    """Length."""
+    return math.sqrt(dot(a, a))
+
+
+@overload(norm, **_OPTIONS)
+def _norm(a):
+    if a.count == 1:
+        return lambda a: abs(a[0])
+    return lambda a: math.sqrt(dot(a, a))
+
+
+def add(a, b):
+    """a + b."""
+    return tuple(x + y for x, y in zip(a, b, strict=True))
+
+
+@overload(add, **_OPTIONS)
+def _add(a, b):
+    return _choose(
+        a,
+        lambda a, b: (a[0] + b[0], a[1] + b[1]),
+        lambda a, b: (a[0] + b[0], a[1] + b[1], a[2] + b[2]),
+        lambda a, b: (a[0] + b[0],),
+    )
+
+
+def sub(a, b):
+    """a − b."""
+    return tuple(x - y for x, y in zip(a, b, strict=True))
+
+
+@overload(sub, **_OPTIONS)
+def _sub(a, b):
+    return _choose(
+        a,
+        lambda a, b: (a[0] - b[0], a[1] - b[1]),
+        lambda a, b: (a[0] - b[0], a[1] - b[1], a[2] - b[2]),
+        lambda a, b: (a[0] - b[0],),
+    )
+
+
+def scale(s, a):
+    """s·a."""
+    return tuple(s * x for x in a)
+
+
+@overload(scale, **_OPTIONS)
+def _scale(s, a):
+    return _choose(
+        a,
+        lambda s, a: (s * a[0], s * a[1]),
+        lambda s, a: (s * a[0], s * a[1], s * a[2]),
+        lambda s, a: (s * a[0],),
+    )
+
+
+def axpy(s, a, b):
+    """s·a + b."""
+    return tuple(s * x + y for x, y in zip(a, b, strict=True))
+
+
+@overload(axpy, **_OPTIONS)
+def _axpy(s, a, b):
+    return _choose(
+        a,
+        lambda s, a, b: (s * a[0] + b[0], s * a[1] + b[1]),
+        lambda s, a, b: (s * a[0] + b[0], s * a[1] + b[1], s * a[2] + b[2]),
+        lambda s, a, b: (s * a[0] + b[0],),
+    )
+
+
+def load(array, i, like):
+    """Row i of an array with at least D columns, as a vector."""
+    return tuple(float(array[i, k]) for k in range(len(like)))
+
+
+@overload(load, **_OPTIONS)
+def _load(array, i, like):
+    return _choose(
+        like,
+        lambda array, i, like: (array[i, 0], array[i, 1]),
+        lambda array, i, like: (array[i, 0], array[i, 1], array[i, 2]),
+    )
+
+
+def load_tangent(array, i, like):
+    """Row i of an array of tangential vectors or spins (1 column in 2D, 3 in 3D)."""
+    return tuple(float(array[i, k]) for k in range(1 if len(like) == 2 else 3))
+
+
+@overload(load_tangent, **_OPTIONS)
+def _load_tangent(array, i, like):
+    return _choose(
+        like,
+        lambda array, i, like: (array[i, 0],),
+        lambda array, i, like: (array[i, 0], array[i, 1], array[i, 2]),
+    )
+
+
+def store(array, i, a):
+    """Write a tuple into the first columns of row i."""
+    for k, value in enumerate(a):
+        array[i, k] = value
+
+
+@overload(store, **_OPTIONS)
+def _store(array, i, a):
+    def one(array, i, a):
+        array[i, 0] = a[0]
+
+    def two(array, i, a):
+        array[i, 0] = a[0]
+        array[i, 1] = a[1]
+
+    def three(array, i, a):
+        array[i, 0] = a[0]
+        array[i, 1] = a[1]
+        array[i, 2] = a[2]
+
+    return _choose(a, two, three, one)
+
+
+def spin(motion, i, like):
+    """s = R·ω of body i."""
+    return (motion[i, 2],) if len(like) == 2 else (motion[i, 3], motion[i, 4], motion[i, 5])
+
+
+@overload(spin, **_OPTIONS)
+def _spin(motion, i, like):
+    return _choose(
+        like,
+        lambda motion, i, like: (motion[i, 2],),
+        lambda motion, i, like: (motion[i, 3], motion[i, 4], motion[i, 5]),
+    )
+
+
+def store_spin(motion, i, s, like):
+    """Write s = R·ω of body i."""
+    for k, value in enumerate(s):
+        motion[i, len(like) + k] = value
+
+
+@overload(store_spin, **_OPTIONS)
+def _store_spin(motion, i, s, like):
+    def two(motion, i, s, like):
+        motion[i, 2] = s[0]
+
+    def three(motion, i, s, like):
+        motion[i, 3] = s[0]
+        motion[i, 4] = s[1]
+        motion[i, 5] = s[2]
+
+    return _choose(like, two, three)
+
+
+def inverse_mass(motion, i, like):
+    """1/m of body i (0 for a wall)."""
+    return motion[i, 3] if len(like) == 2 else motion[i, 6]
+
+
+@overload(inverse_mass, **_OPTIONS)
+def _inverse_mass(motion, i, like):
+    return _choose(
+        like,
+        lambda motion, i, like: motion[i, 3],
+        lambda motion, i, like: motion[i, 6],
+    )
+
+
+def tangential(u, n, u_n):
+    """Part of u in the plane perpendicular to n; u_n = n·u."""
+    if len(n) == 2:
+        return (n[0] * u[1] - n[1] * u[0],)
+    return tuple(x - u_n * y for x, y in zip(u, n, strict=True))
+
+
+@overload(tangential, **_OPTIONS)
+def _tangential(u, n, u_n):
+    return _choose(
+        n,
+        lambda u, n, u_n: (n[0] * u[1] - n[1] * u[0],),
+        lambda u, n, u_n: (u[0] - u_n * n[0], u[1] - u_n * n[1], u[2] - u_n * n[2]),
+    )
+
+
+def slip(s, n):
+    """s×n in the tangent plane: the surface velocity of a spinning grain."""
+    if len(n) == 2:
+        return (s[0],)
+    return (
+        s[1] * n[2] - s[2] * n[1],
+        s[2] * n[0] - s[0] * n[2],
+        s[0] * n[1] - s[1] * n[0],
+    )
+
+
+@overload(slip, **_OPTIONS)
+def _slip(s, n):
+    return _choose(
+        n,
+        lambda s, n: (s[0],),
+        lambda s, n: (
+            s[1] * n[2] - s[2] * n[1],
+            s[2] * n[0] - s[0] * n[2],
+            s[0] * n[1] - s[1] * n[0],
+        ),
+    )
+
+
+def moment(n, p_t):
+    """n×P for a tangential impulse."""
+    if len(n) == 2:
+        return (p_t[0],)
+    return slip(n, p_t)
+
+
+@overload(moment, **_OPTIONS)
+def _moment(n, p_t):
+    return _choose(n, lambda n, p_t: (p_t[0],), lambda n, p_t: slip(n, p_t))
+
+
+def compose(n, p_n, p_t):
+    """P = P_n n + P_t as a vector in global axes."""
+    if len(n) == 2:
+        return (p_n * n[0] - p_t[0] * n[1], p_n * n[1] + p_t[0] * n[0])
+    return tuple(p_n * x + y for x, y in zip(n, p_t, strict=True))
+
+
+@overload(compose, **_OPTIONS)
+def _compose(n, p_n, p_t):
+    return _choose(
+        n,
+        lambda n, p_n, p_t: (p_n * n[0] - p_t[0] * n[1], p_n * n[1] + p_t[0] * n[0]),
+        lambda n, p_n, p_t: (p_n * n[0] + p_t[0], p_n * n[1] + p_t[1], p_n * n[2] + p_t[2]),
+    )
+
+
+def matvec(matrix, a):
+    """Matrix (D, D) times vector."""
+    return tuple(sum(matrix[k, l] * a[l] for l in range(len(a))) for k in range(len(a)))
+
+
+@overload(matvec, **_OPTIONS)
+def _matvec(matrix, a):
+    return _choose(
+        a,
+        lambda matrix, a: (
+            matrix[0, 0] * a[0] + matrix[0, 1] * a[1],
+            matrix[1, 0] * a[0] + matrix[1, 1] * a[1],
+        ),
+        lambda matrix, a: (
+            matrix[0, 0] * a[0] + matrix[0, 1] * a[1] + matrix[0, 2] * a[2],
+            matrix[1, 0] * a[0] + matrix[1, 1] * a[1] + matrix[1, 2] * a[2],
+            matrix[2, 0] * a[0] + matrix[2, 1] * a[1] + matrix[2, 2] * a[2],
+        ),
+    )
+
+
+def add_outer(target, weight, a, b):
+    """target += weight ∘ (a⊗b) for matrices (D, D): a contact's push on the free cell rates."""
+    for k in range(len(a)):
+        for l in range(len(b)):
+            target[k, l] += weight[k, l] * a[k] * b[l]
+
+
+@overload(add_outer, **_OPTIONS)
+def _add_outer(target, weight, a, b):
+    def two(target, weight, a, b):
+        target[0, 0] += weight[0, 0] * a[0] * b[0]
+        target[0, 1] += weight[0, 1] * a[0] * b[1]
+        target[1, 0] += weight[1, 0] * a[1] * b[0]
+        target[1, 1] += weight[1, 1] * a[1] * b[1]
+
+    def three(target, weight, a, b):
+        for k in range(3):
+            row = a[0] if k == 0 else (a[1] if k == 1 else a[2])
+            target[k, 0] += weight[k, 0] * row * b[0]
+            target[k, 1] += weight[k, 1] * row * b[1]
+            target[k, 2] += weight[k, 2] * row * b[2]
+
+    return _choose(a, two, three)
+
+
+def cell_weight(weight, n, length):
+    """What free cell components add to the local Delassus matrix, as (nn, nt, tt).
+
+    The addition is diag(s_k) in global axes, s_k = Σ_l weight_kl ℓ_l². In 3D nt is 0 and tt an
+    upper bound (the largest s_k): the coupling is O(1/grain_count) and left to the sweeps.
+    """
+    s = [length**2 * sum(weight[k, l] * n[l] ** 2 for l in range(len(n))) for k in range(len(n))]
+    normal = sum(n[k] ** 2 * s[k] for k in range(len(n)))
+    if len(n) == 2:
+        return normal, n[0] * n[1] * (s[1] - s[0]), n[1] ** 2 * s[0] + n[0] ** 2 * s[1]
+    return normal, 0.0, max(s)
+
+
+@overload(cell_weight, **_OPTIONS)
+def _cell_weight(weight, n, length):
+    def two(weight, n, length):
+        x = length * length * n[0] * n[0]
+        y = length * length * n[1] * n[1]
+        s_0 = weight[0, 0] * x + weight[0, 1] * y
+        s_1 = weight[1, 0] * x + weight[1, 1] * y
+        xx = n[0] * n[0]
+        yy = n[1] * n[1]
+        return xx * s_0 + yy * s_1, n[0] * n[1] * (s_1 - s_0), yy * s_0 + xx * s_1
+
+    def three(weight, n, length):
+        squared = (n[0] * n[0], n[1] * n[1], n[2] * n[2])
+        s = scale(length * length, matvec(weight, squared))
+        return dot(squared, s), 0.0, max(s[0], max(s[1], s[2]))
+
+    return _choose(n, two, three)

@@ -1,0 +1,141 @@
+"""The neighbour list of a run: candidate pairs, their impulses, and when to search again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from granufab.kernels.neighbours import conflict_free_order, find_pairs, find_wall_pairs
+from granufab.packing import Array, Contacts, IntArray, WallContacts
+
+__all__ = ["Candidates"]
+
+BATCH, WINDOW = 16, 128
+IMAGE_SPAN = 64
+
+
+class Candidates:
+    """Pairs within the skin, in sweep order, with the impulses carried from step to step.
+
+    A private mutable record of the engine. Pairs are keyed by (i, j, image), so impulses survive
+    a new search; a wall w is body grain_count + w with image 0.
+    """
+
+    def __init__(self, grain_count: int, dimension: int) -> None:
+        self.grain_count = grain_count
+        self.dimension = dimension
+        self.tangents = 1 if dimension == 2 else 3
+        self._allocate(np.empty((0, 2), np.int32), np.empty((0, dimension), np.int32))
+
+    def _allocate(self, pairs: np.ndarray, images: np.ndarray) -> None:
+        count = len(pairs)
+        self.pairs = np.ascontiguousarray(pairs)
+        self.images = np.ascontiguousarray(images)
+        self.normal = np.zeros((count, self.dimension))
+        self.length = np.zeros(count)
+        self.gap = np.zeros(count)
+        self.active = np.zeros(count, dtype=np.bool_)
+        self.impulse_n = np.zeros(count)
+        self.impulse_t = np.zeros((count, self.tangents))
+        self.friction = np.zeros(count)
+
+    @property
+    def count(self) -> int:
+        """Number of candidate pairs."""
+        return len(self.pairs)
+
+    def keys(self) -> IntArray:
+        """One integer per (i, j, image)."""
+        bodies = np.int64(self.grain_count + 2 * self.dimension)
+        key = self.pairs[:, 0].astype(np.int64) * bodies + self.pairs[:, 1]
+        for k in range(self.dimension):
+            key = key * IMAGE_SPAN + (self.images[:, k] + IMAGE_SPAN // 2) % IMAGE_SPAN
+        return key
+
+    def search(
+        self,
+        position: Array,
+        radius: Array,
+        cell: tuple[Array, Array, np.ndarray],
+        skin: float,
+        friction: tuple[float, float],
+    ) -> None:
+        """Find all pairs within ``skin`` [m], keep known impulses, choose the sweep order.
+
+        Args:
+            position: centres [m].
+            radius: [m].
+            cell: (matrix, origin, periodic).
+            skin: surface distance [m].
+            friction: (µ between grains, µ on walls).
+        """
+        matrix, origin, periodic = cell
+        inverse = np.linalg.inv(matrix)
+        capacity = max(64, (self.dimension * 4) * len(radius), 2 * self.count)
+        while True:
+            pairs, images, found = find_pairs(
+                position, radius, matrix, inverse, origin, periodic, skin, capacity
+            )
+            if found <= capacity:
+                break
+            capacity = found
+        pairs, images = pairs[:found], images[:found]
+        if not periodic.all():
+            room = 2 * self.dimension * len(radius)
+            walls, touching = find_wall_pairs(
+                position, radius, matrix, origin, periodic, skin, room
+            )
+            walls = walls[:touching]
+            walls[:, 1] += len(radius)
+            pairs = np.concatenate([pairs, walls])
+            images = np.concatenate([images, np.zeros((touching, self.dimension), np.int32)])
+        old_keys, old_n, old_t = self.keys(), self.impulse_n, self.impulse_t
+        order = conflict_free_order(
+            pairs[:, 0], pairs[:, 1], len(radius) + 2 * self.dimension, BATCH, WINDOW
+        )
+        self._allocate(pairs[order], images[order])
+        self.friction[:] = friction[0]
+        self.friction[self.pairs[:, 1] >= self.grain_count] = friction[1]
+        self._recall(old_keys, old_n, old_t)
+
+    def _recall(self, old_keys: IntArray, old_n: Array, old_t: Array) -> None:
+        if not len(old_keys) or not self.count:
+            return
+        order = np.argsort(old_keys, kind="stable")
+        keys = self.keys()
+        place = np.minimum(np.searchsorted(old_keys[order], keys), len(order) - 1)
+        source = order[place]
+        known = old_keys[source] == keys
+        self.impulse_n[known] = old_n[source[known]]
+        self.impulse_t[known] = old_t[source[known]]
+
+    def shear_images(self, flow: int, axis: int, turns: int) -> None:
+        """Rewrite images after lattice vector ``axis`` lost ``turns`` of vector ``flow``."""
+        self.images[:, flow] += turns * self.images[:, axis]
+
+    def seed_impulses(
+        self, contacts: Contacts | None, walls: WallContacts | None, step: float
+    ) -> None:
+        """Start from the forces of a packing: impulse = force · h."""
+        n = self.normal
+        force = np.zeros((self.count, self.dimension))
+        lookup = {}
+        if contacts is not None and contacts.force is not None:
+            image = contacts.image
+            for c, (i, j) in enumerate(contacts.pair):
+                sign = 1.0 if i < j else -1.0
+                where = () if image is None else tuple(int(sign) * int(x) for x in image[c])
+                lookup[(min(i, j), max(i, j), where)] = sign * contacts.force[c]
+            for c, (i, j) in enumerate(self.pairs):
+                where = () if image is None else tuple(int(x) for x in self.images[c])
+                force[c] = lookup.get((i, j, where), 0.0)
+        if walls is not None:
+            on_wall = {(g, w): f for g, w, f in zip(walls.grain, walls.wall, walls.force)}  # noqa: B905
+            for c in np.flatnonzero(self.pairs[:, 1] >= self.grain_count):
+                wall = int(self.pairs[c, 1]) - self.grain_count
+                force[c] = on_wall.get((int(self.pairs[c, 0]), wall), 0.0)
+        self.impulse_n[:] = np.maximum(np.einsum("ck,ck->c", force, n), 0.0) * step
+        if self.dimension == 2:
+            self.impulse_t[:, 0] = (n[:, 0] * force[:, 1] - n[:, 1] * force[:, 0]) * step
+        else:
+            normal_part = np.einsum("ck,ck->c", force, n)[:, None] * n
+            self.impulse_t[:] = (force - normal_part) * step
