@@ -1,0 +1,107 @@
+"""A case run into its folder: run.h5, settings.toml, series.csv, summary.json."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from granufab.errors import GranufabError, InvalidSettings
+from granufab.history import Run
+from granufab.io import RunFileWriter, read, write_json, write_series, write_text
+from granufab.simulate.settings import Case, to_toml
+
+__all__ = ["RUN_FILES", "Progress", "RunCase", "check_writable", "read_run", "run_into_folder"]
+
+RUN_FILES = ("run.h5", "settings.toml", "series.csv", "summary.json")
+"""What a run leaves in its folder."""
+
+Progress = Callable[[str, float], None]
+"""Called with what is being done and the fraction that is done, 0..1."""
+
+RunCase = Callable[..., Run]
+"""``run_case(case, *, record, progress) -> Run``."""
+
+
+def run_into_folder(
+    case: Case,
+    folder: Path | str,
+    *,
+    force: bool = False,
+    progress: Progress | None = None,
+    run_case: RunCase | None = None,
+) -> Run:
+    """Run a case and leave ``run.h5 settings.toml series.csv summary.json`` in a folder.
+
+    The run file grows frame by frame while the case runs, so an interrupted run can be read.
+
+    Args:
+        case: what to simulate.
+        folder: made if missing; an earlier run in it is replaced only with ``force``.
+        force: replace the four files where they exist.
+        progress: called a few times a second.
+        run_case: what simulates; :func:`granufab.simulate.run_case` by default.
+    Returns:
+        The run, as simulated.
+    Raises:
+        InvalidSettings: the folder holds a run already, or cannot be written; nothing was
+            computed or touched.
+    """
+    folder = Path(folder)
+    held = [name for name in RUN_FILES if (folder / name).exists()]
+    if held and not force:
+        raise InvalidSettings(
+            f"{folder}: holds {held[0]} already; nothing was changed; "
+            "choose another folder, or --force to replace it"
+        )
+    check_writable(folder)
+    if run_case is None:
+        from granufab.simulate import run_case as simulate_case
+
+        run_case = simulate_case
+    for name in held:
+        (folder / name).unlink()
+    write_text(to_toml(case), folder / "settings.toml")
+    settings = case.model_dump(mode="json")
+    with RunFileWriter(folder / "run.h5", settings=settings, force=True) as recorder:
+        run = run_case(case, record=recorder, progress=progress)
+        recorder.close(None if run.summary.get("interrupted") else run.summary)
+    write_series(run.series, folder / "series.csv", case.name)
+    write_json(_summary(case, run), folder / "summary.json")
+    return run
+
+
+def _summary(case: Case, run: Run) -> dict[str, Any]:
+    import granufab
+
+    return {"granufab": granufab.__version__, "name": case.name, **run.summary}
+
+
+def check_writable(folder: Path) -> None:
+    """Make ``folder`` and prove that a file can be written in it.
+
+    Raises:
+        InvalidSettings: it cannot.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=folder, prefix=".granufab-")
+        os.close(handle)
+        Path(name).unlink()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InvalidSettings(f"{folder}: cannot be written ({reason})") from None
+
+
+def read_run(folder: Path) -> Run:
+    """The run that :func:`run_into_folder` left in ``folder``.
+
+    Raises:
+        GranufabError: there is none, or it is damaged.
+    """
+    path = folder / "run.h5"
+    if not path.exists():
+        raise GranufabError(f"{path}: the run left no run file")
+    return read(path)

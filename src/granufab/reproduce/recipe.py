@@ -1,0 +1,130 @@
+"""A figure of the paper as a frozen recipe, and what running it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from granufab.history import Run
+from granufab.packing import Array
+from granufab.simulate.settings import Case, Material, Sample, Stage
+from granufab.states import AccessibleFit
+
+__all__ = ["Outcome", "PathRecipe", "Recipe", "column", "first_stage", "last_stage"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PathRecipe:
+    """One path of a figure.
+
+    Attributes:
+        name: name in series, folders and the legend's data.
+        label: text of the legend; {z_0} becomes the value that was reached.
+        coordination: wanted z_0 of the isotropic sample [-].
+        friction: µ while the path is followed [-].
+        strains: deviatoric strain of each stage; negative reverses [-].
+    """
+
+    name: str
+    label: str
+    coordination: float
+    friction: float = 0.4
+    strains: tuple[float, ...] = (0.3,)
+
+    def case(self, *, grain_count: int, seed: int, name: str | None = None) -> Case:
+        """The case to run, at the default solver settings."""
+        return Case(
+            name=name or self.name,
+            sample=Sample(grain_count=grain_count, coordination=self.coordination, seed=seed),
+            material=Material(friction=self.friction),
+            path=tuple(Stage(loading="constant-mean", strain=strain) for strain in self.strains),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Outcome:
+    """What the paths of a figure gave.
+
+    Attributes:
+        recipe: the recipe that was followed.
+        runs: repeats of each path, by the path's name.
+        fits: accessible domain of all paths together, by method.
+        failures: why a method is not among the fits.
+        path_fits: critical-state fit of each path.
+        z_definition: column of the coordination number.
+    """
+
+    recipe: Recipe
+    runs: Mapping[str, list[Run]]
+    fits: Mapping[str, AccessibleFit]
+    failures: Mapping[str, str]
+    path_fits: Mapping[str, AccessibleFit]
+    z_definition: str
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Text of the legend of each path, with the z_0 that was reached."""
+        labels = {}
+        for path in self.recipe.paths:
+            z_0 = np.mean(
+                [column(run.series, self.z_definition)[0] for run in self.runs[path.name]]
+            )
+            labels[path.name] = path.label.replace("{z_0}", f"{z_0:.2f}")
+        return labels
+
+    @property
+    def labelled(self) -> dict[str, list[Run]]:
+        """The repeats of each path by the text of the legend."""
+        return {self.labels[name]: runs for name, runs in self.runs.items()}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recipe:
+    """A figure: its paths, and how it is drawn.
+
+    Attributes:
+        figure: name, for example fig7.
+        paths: the paths it shows.
+        grain_count: grains per sample at full size.
+        draw: makes the figure.
+        extra: further entries of the figure's JSON file.
+        fit_from: name of the path whose states alone define the domain; None takes all paths.
+    """
+
+    figure: str
+    paths: tuple[PathRecipe, ...]
+    draw: Callable[[Outcome], Figure]
+    grain_count: int = 5000
+    extra: Callable[[Outcome], dict[str, Any]] = field(default=lambda outcome: {})
+    fit_from: str | None = None
+
+
+def first_stage(series: xr.Dataset) -> xr.Dataset:
+    """The records up to the first reversal of the strain (all of them if there is none)."""
+    turn = _turn(series)
+    return series if turn is None else series.isel(record=slice(0, turn + 1))
+
+
+def last_stage(series: xr.Dataset) -> xr.Dataset | None:
+    """The records from the first reversal of the strain on, or None without one."""
+    turn = _turn(series)
+    return None if turn is None else series.isel(record=slice(turn, None))
+
+
+def _turn(series: xr.Dataset) -> int | None:
+    step = np.diff(column(series, "eps_q"))
+    moving = np.flatnonzero(step)
+    if len(moving) == 0:
+        return None
+    back = np.flatnonzero(np.sign(step) == -np.sign(step[moving[0]]))
+    return int(back[0]) if len(back) else None
+
+
+def column(series: xr.Dataset, name: str) -> Array:
+    """One column of a series as numbers."""
+    return np.asarray(series[name].values, dtype=float)
