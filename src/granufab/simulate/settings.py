@@ -43,15 +43,16 @@ class Sizes(_Settings):
 
     kind: Literal[
         "uniform", "uniform-by-volume", "bidisperse", "log-normal", "monodisperse", "file"
-    ] = Field("uniform", description="distribution of diameters")
+    ] = Field(default="uniform", description="distribution of diameters")
     spread: NonNegative = Field(
-        0.2, description="uniform: half width / mean; log-normal: standard deviation of ln d"
+        default=0.2,
+        description="uniform: half width / mean; log-normal: standard deviation of ln d",
     )
-    ratio: Positive = Field(1.4, description="bidisperse: large / small diameter")
+    ratio: Positive = Field(default=1.4, description="bidisperse: large / small diameter")
     large_fraction: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.5, description="bidisperse: number fraction of large grains"
+        default=0.5, description="bidisperse: number fraction of large grains"
     )
-    file: str | None = Field(None, description="file of radii, one per line, used in order")
+    file: str | None = Field(default=None, description="file of radii, one per line, used in order")
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -66,36 +67,40 @@ class Sample(_Settings):
     """How the isotropic starting sample is made."""
 
     grain_count: Annotated[int, Field(ge=1, le=100_000_000)] = Field(
-        2000, description="number of grains"
+        default=2000, description="number of grains"
     )
-    dimension: Literal[2, 3] = Field(2, description="2 (disks) or 3 (spheres)")
+    dimension: Literal[2, 3] = Field(default=2, description="2 (disks) or 3 (spheres)")
     sizes: Sizes = Sizes()
-    diameter: Positive = Field(1.0, description="mean diameter d")
-    density: Positive = Field(1.0, description="mass per area (2D) or volume (3D) of a grain")
-    pressure: Positive = Field(1.0, description="confining stress p")
-    coordination: Positive | None = Field(
-        None, description="wanted z_0, reached by bisecting the compaction friction"
+    diameter: Positive = Field(default=1.0, description="mean diameter d")
+    density: Positive = Field(
+        default=1.0, description="mass per area (2D) or volume (3D) of a grain"
     )
-    coordination_tolerance: Positive = Field(0.03, description="accepted |z_0 - wanted|")
-    z_definition: ZDefinition = Field("z_backbone", description="which z is meant")
+    pressure: Positive = Field(default=1.0, description="confining stress p")
+    coordination: Positive | None = Field(
+        default=None, description="wanted z_0, reached by bisecting the compaction friction"
+    )
+    coordination_tolerance: Positive = Field(default=0.03, description="accepted |z_0 - wanted|")
+    z_definition: ZDefinition = Field(default="z_backbone", description="which z is meant")
     friction: NonNegative = Field(
-        0.0, description="compaction friction where no coordination is wanted"
+        default=0.0, description="compaction friction where no coordination is wanted"
     )
     solid_fraction: Annotated[float, Field(gt=0, lt=0.7)] = Field(
-        0.45, description="of the dilute random start"
+        default=0.45, description="of the dilute random start"
     )
-    boundary: Literal["periodic", "walls"] = Field("periodic", description="periodic or walls")
-    file: str | None = Field(None, description="start from the last frame of this run file")
-    seed: Annotated[int, Field(ge=0)] = Field(1, description="random seed")
+    boundary: Literal["periodic", "walls"] = Field(
+        default="periodic", description="periodic or walls"
+    )
+    file: str | None = Field(default=None, description="start from the last frame of this run file")
+    seed: Annotated[int, Field(ge=0)] = Field(default=1, description="random seed")
 
 
 class Material(_Settings):
     """Contact law of the grains while the path is followed."""
 
-    friction: NonNegative = Field(0.4, description="friction coefficient mu between grains")
-    wall_friction: NonNegative = Field(0.0, description="friction coefficient on walls")
+    friction: NonNegative = Field(default=0.4, description="friction coefficient mu between grains")
+    wall_friction: NonNegative = Field(default=0.0, description="friction coefficient on walls")
     restitution: Annotated[float, Field(ge=0, le=1)] = Field(
-        0.0, description="normal restitution coefficient e"
+        default=0.0, description="normal restitution coefficient e"
     )
 
 
@@ -103,27 +108,29 @@ class Solver(_Settings):
     """Contact Dynamics solver."""
 
     tolerance: Annotated[float, Field(gt=0, lt=1)] = Field(
-        1e-4, description="residual at which a step is converged"
+        default=1e-4, description="residual at which a step is converged"
     )
     max_sweeps: Annotated[int, Field(ge=1)] = Field(
-        2000, description="sweeps after which a step is counted as not converged"
+        default=2000, description="sweeps after which a step is counted as not converged"
     )
     stiffness: Annotated[float, Field(gt=0)] = Field(
-        5e4, description="implicit contact stiffness k/p (3D: k/(p d)); inf is rigid"
+        default=5e4, description="implicit contact stiffness k/p (3D: k/(p d)); inf is rigid"
     )
-    momentum: bool = Field(True, description="accelerate the sweeps by safeguarded momentum")
-    strict: bool = Field(False, description="a step that does not converge is an error")
+    momentum: bool = Field(
+        default=True, description="accelerate the sweeps by safeguarded momentum"
+    )
+    strict: bool = Field(default=False, description="a step that does not converge is an error")
     overlap_correction: Annotated[float, Field(ge=0, le=0.1)] = Field(
-        0.05, description="share beta of an overlap removed per step (rigid contacts)"
+        default=0.05, description="share beta of an overlap removed per step (rigid contacts)"
     )
     time_step: Positive = Field(
-        0.2, description="largest time step in sqrt(m/p) (2D) or sqrt(m/(p d)) (3D)"
+        default=0.2, description="largest time step in sqrt(m/p) (2D) or sqrt(m/(p d)) (3D)"
     )
     step_strain: Annotated[float, Field(gt=0, le=1e-2)] = Field(
-        1e-4, description="largest strain per step"
+        default=1e-4, description="largest strain per step"
     )
     skin: Annotated[float, Field(gt=0, le=1)] = Field(
-        0.1, description="neighbour-list margin in mean diameters"
+        default=0.1, description="neighbour-list margin in mean diameters"
     )
 
 
@@ -132,16 +139,23 @@ class Stage(_Settings):
 
     loading: Literal[
         "isotropic", "constant-mean", "biaxial", "simple-shear", "simple-shear-volume"
-    ] = Field("constant-mean", description="which cell components are rate- and stress-driven")
+    ] = Field(
+        default="constant-mean", description="which cell components are rate- and stress-driven"
+    )
     strain: float = Field(
-        0.3, description="deviatoric strain of this stage; negative reverses; isotropic: compaction"
+        default=0.3,
+        description="deviatoric strain of this stage; negative reverses; isotropic: compaction",
     )
     inertial_number: Positive | None = Field(
-        1e-3, description="I = rate sqrt(m/p) (2D), rate d sqrt(density/p) (3D); sets the rate"
+        default=1e-3,
+        description="I = rate sqrt(m/p) (2D), rate d sqrt(density/p) (3D); sets the rate",
     )
-    rate: Positive | None = Field(None, description="deviatoric rate instead of inertial_number")
+    rate: Positive | None = Field(
+        default=None, description="deviatoric rate instead of inertial_number"
+    )
     axis: Annotated[int, Field(ge=0, le=2)] = Field(
-        1, description="compression axis (constant-mean, biaxial), gradient axis (simple shear)"
+        default=1,
+        description="compression axis (constant-mean, biaxial), gradient axis (simple shear)",
     )
 
     @model_validator(mode="after")
@@ -156,20 +170,24 @@ class Stage(_Settings):
 class Record(_Settings):
     """What is written while a path runs."""
 
-    series_interval: Positive = Field(1e-3, description="strain between rows of the series")
-    frame_interval: Positive = Field(1e-2, description="strain between complete frames")
+    series_interval: Positive = Field(default=1e-3, description="strain between rows of the series")
+    frame_interval: Positive = Field(default=1e-2, description="strain between complete frames")
     reach: NonNegative = Field(
-        0.05, description="pairs up to this gap are recorded, in mean diameters"
+        default=0.05, description="pairs up to this gap are recorded, in mean diameters"
     )
-    criterion: str = Field("force", description="contact criterion: force, gap:DELTA or listed")
-    z_definition: ZDefinition = Field("z_backbone", description="definition of z on figures")
+    criterion: str = Field(
+        default="force", description="contact criterion: force, gap:DELTA or listed"
+    )
+    z_definition: ZDefinition = Field(
+        default="z_backbone", description="definition of z on figures"
+    )
 
 
 class Case(_Settings):
     """A complete case: sample, material, solver, path, record."""
 
     schema_version: Literal[1] = 1
-    name: str = Field("run", description="name of the path in series and figures")
+    name: str = Field(default="run", description="name of the path in series and figures")
     sample: Sample = Sample()
     material: Material = Material()
     solver: Solver = Solver()
@@ -184,8 +202,9 @@ class Case(_Settings):
                     f"path.{index}.axis is {stage.axis}, allowed 0..{self.sample.dimension - 1}"
                 )
             if self.sample.boundary == "walls" and stage.loading.startswith("simple-shear"):
-                raise ValueError(f"path.{index}.loading is {stage.loading}, which needs a "
-                                 "periodic sample")
+                raise ValueError(
+                    f"path.{index}.loading is {stage.loading}, which needs a periodic sample"
+                )
         return self
 
 
@@ -281,9 +300,7 @@ def to_toml(case: Case, *, comments: bool = False) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _section(
-    lines: list[str], header: str, model: _Settings, comments: bool, prefix: str
-) -> None:
+def _section(lines: list[str], header: str, model: _Settings, comments: bool, prefix: str) -> None:
     lines += ["", header]
     nested: list[tuple[str, _Settings]] = []
     for name, info in type(model).model_fields.items():
