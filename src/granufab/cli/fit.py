@@ -1,0 +1,109 @@
+"""``granufab fit``: the accessible domain of recorded paths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from granufab.errors import MissingData
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from granufab.states import AccessibleFit
+
+__all__ = ["fit", "fit_series", "read_paths"]
+
+Method = Literal["critical", "envelope", "lines"]
+Definition = Literal["z", "z_backbone", "z_mechanical"]
+
+
+def fit(
+    series: Annotated[
+        list[Path],
+        typer.Argument(metavar="SERIES...", help="series.csv, run.h5, or a CSV with z and a."),
+    ],
+    method: Annotated[Method, typer.Option(help="How z_min and z_max are found.")] = "critical",
+    z_definition: Annotated[
+        Definition | None, typer.Option(help="Which z; default z_backbone, or z if alone.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="JSON on standard output.")] = False,
+) -> None:
+    """Fit z_min, z_max and the critical state, with 95 % intervals.
+
+    Each path counts up to its first reversal.
+    """
+    from granufab.cli.output import print_json, print_rows
+    from granufab.reproduce.report import fit_entry
+
+    paths = [path for file in series for path in read_paths(file)]
+    found, definition = fit_series(paths, method, z_definition)
+    entry = fit_entry(found) | {"z_definition": definition, "series": [str(s) for s in series]}
+    if json:
+        print_json(entry)
+        return
+    names = ("z_min", "z_max", "z_star", "a_star")
+    rows = [[name, *(entry[name][part] for part in ("value", "low", "high"))] for name in names]
+    print_rows(f"fit: {method}; z: {definition}", ("", "value", "low", "high"), rows)
+    print(f"{found.outside_fraction:.1%} of the states lie outside the fitted domain")
+
+
+def fit_series(
+    paths: Sequence[xr.Dataset], method: Method = "critical", z_definition: str | None = None
+) -> tuple[AccessibleFit, str]:
+    """Fit the domain to some series; returns the fit and the definition of z it used."""
+    from granufab.reproduce.recipe import first_stage
+    from granufab.states import fit_accessible_states
+
+    definition = z_definition or _default_definition(paths)
+    rows = [_known_rows(first_stage(path), definition) for path in paths]
+    strain, z, a = ([row[name] for row in rows] for name in ("eps_q", definition, "a"))
+    return fit_accessible_states(strain, z, a, method=method), definition
+
+
+def read_paths(file: Path) -> list[xr.Dataset]:
+    """The series of a run file, or of each path in a CSV; rows count as strain if none is given."""
+    from granufab.io import read, read_series
+
+    table = read_series(file) if _is_text(file) else read(file).series
+    if "eps_q" not in table:
+        table = table.assign(eps_q=("record", [float(k) for k in range(table.sizes["record"])]))
+    if "path" not in table.coords:
+        return [table]
+    names = dict.fromkeys(table.coords["path"].values.tolist())
+    return [table.isel(record=table.coords["path"].values == name) for name in names]
+
+
+def _is_text(file: Path) -> bool:
+    try:
+        with file.open("rb") as stream:
+            head = stream.read(512)
+    except OSError as error:
+        raise MissingData(f"{file}: cannot be read ({error.strerror})") from None
+    return b"\0" not in head
+
+
+def _default_definition(paths: Sequence[xr.Dataset]) -> str:
+    return "z_backbone" if all("z_backbone" in path for path in paths) else "z"
+
+
+def _known_rows(path: xr.Dataset, definition: str) -> dict:
+    """The rows where strain, z and a are known; a is the signed one where the series has it."""
+    import numpy as np
+
+    signed = "a_signed" in path and not bool(path["a_signed"].isnull().all())
+    columns = {"eps_q": "eps_q", definition: definition, "a": "a_signed" if signed else "a"}
+    for name in columns.values():
+        if name not in path:
+            held = ", ".join(str(key) for key in path.data_vars)
+            raise MissingData(f"the series has no column {name}; it holds {held}")
+    table = np.array([path[name].values for name in columns.values()], dtype=float)
+    known = table[:, np.isfinite(table).all(axis=0)]
+    if not known.size:
+        raise MissingData(
+            f"the series has no row where {', '.join(columns.values())} are all known"
+        )
+    return dict(zip(columns, known, strict=True))

@@ -1,0 +1,130 @@
+"""``granufab measure``: the fabric of every state in some files."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from granufab.errors import InvalidSettings
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from granufab.history import Run
+
+__all__ = ["measure"]
+
+Definition = Literal["z", "z_backbone", "z_mechanical"]
+COUNTS = ("contact_count", "grain_count", "dimension", "stage")
+SHOWN = (
+    "eps_q",
+    "z",
+    "z_backbone",
+    "rattler_fraction",
+    "a",
+    "a_signed",
+    "theta_c",
+    "q_over_p",
+    "phi",
+)
+
+
+def measure(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Run files.")],
+    criterion: Annotated[
+        str, typer.Option(metavar="force|gap:δ|listed", help="Which pairs count as contacts.")
+    ] = "force",
+    z_definition: Annotated[
+        Definition, typer.Option(help="Whose contacts and grains the fabric counts.")
+    ] = "z_backbone",
+    frame: Annotated[
+        int | None, typer.Option(metavar="K", help="One state only; negative from the end.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="A JSON list on standard output.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv|.nc", help="Also write all values here.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace --out if it exists.")] = False,
+) -> None:
+    """Measure z, fabric tensors, anisotropy and stress of every recorded state."""
+    from granufab.cli.output import print_json, print_rows
+
+    _check_out(out, force)
+    tables = [_measure_file(file, criterion, z_definition, frame) for file in files]
+    if out is not None:
+        _write(tables, out)
+    states = [state for table in tables for state in _states(table)]
+    if json:
+        print_json(states)
+        return
+    title = f"contacts: {criterion}; fabric of: {z_definition}"
+    shown = [[state["source"], state["frame"], *map(state.get, SHOWN)] for state in states]
+    print_rows(title, ("source", "frame", *SHOWN), shown)
+
+
+def _measure_file(file: Path, criterion: str, z_definition: Any, frame: int | None) -> xr.Dataset:
+    """One row per state, with its source and number."""
+    from dataclasses import replace
+
+    from granufab.fabric import measure_run
+    from granufab.io import read
+
+    run = read(file)
+    numbers = list(range(len(run.frames)))
+    if frame is not None:
+        if not -len(numbers) <= frame < len(numbers):
+            raise InvalidSettings(f"--frame {frame}: {file} holds frames 0..{len(numbers) - 1}")
+        numbers = [numbers[frame]]
+        run = replace(run, frames=[run.frames[frame]])
+    table = measure_run(run, criterion=criterion, z_definition=z_definition)
+    _explain_unknown(file, run, table)
+    table = table.assign(source=("frame", [str(file)] * len(numbers)))
+    return table.assign_coords(frame=numbers)
+
+
+def _check_out(out: Path | None, force: bool) -> None:
+    if out is None:
+        return
+    if out.suffix not in (".csv", ".nc"):
+        raise InvalidSettings(f"--out {out}: the name must end in .csv or .nc")
+    if out.exists() and not force:
+        raise InvalidSettings(f"{out}: exists already; name another file, or --force")
+
+
+def _states(table: xr.Dataset) -> Iterator[dict[str, Any]]:
+    """One plain object per state."""
+    columns = {str(name): table[name].values.tolist() for name in ("source", "frame", *table)}
+    for name in set(COUNTS) & set(columns):
+        columns[name] = [None if value != value else int(value) for value in columns[name]]
+    definitions = {name: table.attrs[name] for name in ("criterion", "z_definition")}
+    for row in range(table.sizes["frame"]):
+        yield {name: column[row] for name, column in columns.items()} | definitions
+
+
+def _explain_unknown(file: Path, run: Run, table: xr.Dataset) -> None:
+    """Say once, on standard error, why some columns are unknown throughout."""
+    if not any(bool(table[name].isnull().all()) for name in table.data_vars):
+        return
+    from granufab.fabric import measure as measure_state
+
+    first = run.frames[0]
+    state = measure_state(
+        first.packing,
+        criterion=table.attrs["criterion"],
+        z_definition=table.attrs["z_definition"],
+        direction=first.direction,
+    )
+    if state["missing"]:
+        print(f"granufab: {file}: some values are unknown: {state['missing']}", file=sys.stderr)
+
+
+def _write(tables: list[xr.Dataset], out: Path) -> None:
+    import xarray as xr
+
+    from granufab.io import write_dataset
+
+    write_dataset(xr.concat(tables, "frame", data_vars="all"), out)

@@ -1,0 +1,75 @@
+"""Progress of a computation on standard error: a bar on a terminal, else a line now and then."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+__all__ = ["show_progress"]
+
+SECONDS_BETWEEN_LINES = 5.0
+
+
+@contextmanager
+def show_progress() -> Iterator[Callable[[str, float], None]]:
+    """Give a callable ``progress(text, fraction)`` that shows how far a computation is."""
+    if sys.stderr.isatty():
+        with _bar() as report:
+            yield report
+    else:
+        yield _lines()
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[str, float], None]]:
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(elapsed_when_finished=True),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=1.0)
+        last = 0.0
+
+        def report(text: str, fraction: float) -> None:
+            nonlocal last
+            if fraction < last:  # another part of the work began
+                bar.reset(task)
+            last = fraction
+            bar.update(task, description=text, completed=fraction)
+
+        yield report
+
+
+def _lines() -> Callable[[str, float], None]:
+    printed = began = time.monotonic()
+    first = last = 0.0
+
+    def report(text: str, fraction: float) -> None:
+        nonlocal printed, began, first, last
+        now = time.monotonic()
+        if fraction < last:
+            began, first = now, fraction
+        last = fraction
+        if now - printed < SECONDS_BETWEEN_LINES:
+            return
+        printed = now
+        left = ""
+        if fraction > first:
+            seconds = (now - began) * (1.0 - fraction) / (fraction - first)
+            left = f", about {seconds:.0f} s left"
+        print(f"{text}: {100 * fraction:.0f} %{left}", file=sys.stderr, flush=True)
+
+    return report

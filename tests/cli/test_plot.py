@@ -1,0 +1,57 @@
+"""``plot`` writes each figure as a picture of the asked kind, and nothing where it cannot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.image
+import pytest
+
+FIGURES = ["path", "zaz", "series", "mohr", "rose", "network"]
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_each_figure_is_drawn(granufab, run_file: Path, tmp_path: Path, figure: str) -> None:
+    out = tmp_path / f"{figure}.png"
+    done = granufab("plot", run_file, "--figure", figure, "-o", out)
+    assert done.code == 0, done.err
+    picture = matplotlib.image.imread(out)
+    assert picture.shape[0] > 300
+    assert picture.shape[1] > 300
+    assert picture[..., :3].min() < 0.5 < picture[..., :3].max()  # ink on paper
+
+
+def test_the_ending_decides_the_kind(granufab, run_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "rose.pdf"
+    assert granufab("plot", run_file, "--figure", "rose", "-o", out, "--frame", 0).code == 0
+    assert out.read_bytes().startswith(b"%PDF")
+
+
+def test_an_unknown_ending(granufab, run_file: Path, tmp_path: Path) -> None:
+    done = granufab("plot", run_file, "--figure", "rose", "-o", tmp_path / "rose.doc")
+    assert done.code == 2
+    assert ".pdf" in done.err
+
+
+def test_a_folder_that_is_not_there(granufab, run_file: Path, tmp_path: Path) -> None:
+    done = granufab("plot", run_file, "--figure", "rose", "-o", tmp_path / "no" / "rose.png")
+    assert done.code == 2
+    assert "no folder" in done.err
+
+
+def test_a_state_that_is_not_there(granufab, run_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "rose.png"
+    done = granufab("plot", run_file, "--figure", "rose", "-o", out, "--frame", 7)
+    assert done.code == 2
+    assert "0..2" in done.err
+    assert not out.exists()
+
+
+def test_no_overwriting_without_force(granufab, run_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "rose.png"
+    out.write_text("precious", encoding="utf-8")
+    done = granufab("plot", run_file, "--figure", "rose", "-o", out)
+    assert done.code == 2
+    assert out.read_text(encoding="utf-8") == "precious"
+    assert granufab("plot", run_file, "--figure", "rose", "-o", out, "--force").code == 0
+    assert out.read_bytes().startswith(b"\x89PNG")
