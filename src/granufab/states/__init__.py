@@ -1,0 +1,31 @@
+"""Theory on (z, a) numbers: accessible domain, Mohr circle, fits. Plain arrays in, records out."""
+
+from granufab.states.bootstrap import Bootstrap, Estimate, autocorrelation_time
+from granufab.states.compare import PairedDifference, paired_difference
+from granufab.states.critical import CriticalState, critical_state
+from granufab.states.domain import AccessibleDomain, saturation_slopes
+from granufab.states.fit import AccessibleFit, fit_accessible_states
+from granufab.states.mohr import MohrCircle, critical_circle, limit_circles, mohr, tangent_line
+from granufab.states.steric import exclusion_angle, steric_anisotropy, steric_coordination
+
+__all__ = [
+    "AccessibleDomain",
+    "AccessibleFit",
+    "Bootstrap",
+    "CriticalState",
+    "Estimate",
+    "MohrCircle",
+    "PairedDifference",
+    "autocorrelation_time",
+    "critical_circle",
+    "critical_state",
+    "exclusion_angle",
+    "fit_accessible_states",
+    "limit_circles",
+    "mohr",
+    "paired_difference",
+    "saturation_slopes",
+    "steric_anisotropy",
+    "steric_coordination",
+    "tangent_line",
+]
