@@ -24,7 +24,7 @@ Definition = Literal["z", "z_backbone", "z_mechanical"]
 def fit(
     series: Annotated[
         list[Path],
-        typer.Argument(metavar="SERIES...", help="series.csv, run.h5, or a CSV with z and a."),
+        typer.Argument(metavar="SERIES", help="series.csv, run.h5, or a CSV with z and a."),
     ],
     method: Annotated[Method, typer.Option(help="How z_min and z_max are found.")] = "critical",
     z_definition: Annotated[

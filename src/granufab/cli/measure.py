@@ -34,7 +34,7 @@ SHOWN = (
 
 
 def measure(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Run files.")],
+    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="Run files.")],
     criterion: Annotated[
         str, typer.Option(metavar="force|gap:δ|listed", help="Which pairs count as contacts.")
     ] = "force",

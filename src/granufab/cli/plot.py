@@ -24,7 +24,7 @@ ENDINGS = (".pdf", ".png", ".svg", ".eps", ".jpg", ".jpeg", ".tif", ".tiff", ".w
 
 
 def plot(
-    runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run files.")],
+    runs: Annotated[list[Path], typer.Argument(metavar="RUN", help="Run files.")],
     figure: Annotated[Name, typer.Option(help="What is drawn.")],
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="FILE", help="PDF, PNG, SVG…, by its ending.")
