@@ -21,19 +21,21 @@ def deform(packing, gradient, remap=None, scatter=None):
 
 
 def travelled(packing, generator):
-    """The same state with grains shifted by lattice vectors: positions are not wrapped."""
+    """The same state with grains shifted at random by lattice vectors."""
     turns = generator.integers(-3, 4, packing.grains.position.shape)
     position = packing.grains.position + turns @ packing.cell.matrix.T
     return replace(packing, grains=Grains(position=position, radius=packing.grains.radius))
 
 
 @pytest.mark.parametrize("remap", [None, np.array([[1.0, -1.0], [0.0, 1.0]])])
-def test_homogeneous_strain_comes_back_in_every_box(remap):
+@pytest.mark.parametrize("wrapped_between", [False, True])
+def test_homogeneous_strain_comes_back_in_every_box(remap, wrapped_between):
     generator = np.random.default_rng(1)
     tilted = np.array([[20.0, 9.0], [0.0, 20.0]])
     before = travelled(jittered(generator, 400, matrix=tilted), generator)
     gradient = np.array([[0.01, 0.04], [0.0, -0.03]])
-    data = local_strain(before, deform(before, gradient, remap))
+    after = deform(before, gradient, remap)
+    data = local_strain(before, travelled(after, generator) if wrapped_between else after)
     expected = -0.5 * (gradient + gradient.T)
     assert data.sizes["box"] == 16
     np.testing.assert_allclose(data.strain, np.tile(expected, (16, 1, 1)), atol=1e-12)

@@ -113,7 +113,8 @@ def test_units_do_not_matter_but_to_the_stress():
 def test_space_states_have_three_principal_values():
     values = measure(forced(count=343, dimension=3), direction=np.array([0, 0, 1.0]))
     assert values["g_1"] + values["g_2"] + values["g_3"] == pytest.approx(values["z_backbone"] / 2)
-    assert values["q_g"] == pytest.approx(values["z_backbone"] * values["a"] / 15 * 2 / 2)
+    # q_G = (G_1 − G_3)/3 = (z/2)(F_1 − F_3)/3 and a = (5/2)(F_1 − F_3).
+    assert values["q_g"] == pytest.approx(values["z_backbone"] * values["a"] / 15)
     assert 0 <= values["b_g"] <= 1
     assert 0 <= values["theta_c"] <= 90
     lattice = measure(face_centred(), criterion="gap:0.01")

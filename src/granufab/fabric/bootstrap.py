@@ -90,7 +90,8 @@ def _block_sums(packing: Packing, network: Network, direction: Array) -> Array:
         np.bincount(owner, minlength=count),
         np.bincount(owner, weights=np.repeat(along, 2), minlength=count),
     ]
-    return np.column_stack(sums)[np.bincount(block, minlength=count) > 0]
+    table = np.column_stack(sums).astype(np.float64)
+    return table[np.bincount(block, minlength=count) > 0]
 
 
 def _blocks(packing: Packing) -> IntArray:

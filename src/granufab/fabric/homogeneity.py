@@ -22,12 +22,12 @@ def local_strain(before: Packing, after: Packing, *, cells: int | None = None) -
     In each box the displacements u of its grains are fitted by u_0 + H·(x − x_0); the local
     strain is −(H + Hᵀ)/2, compression positive, and the local deviatoric strain its component
     along the mean strain, :math:`\varepsilon_q^{loc} = \varepsilon_q\,(ε^{loc}:\bar ε')/(\bar
-    ε':\bar ε')`, so that its mean is the mean ε_q. Grains that left the cell are brought back
-    with the lattice of either state, so periodic (also remapped) cells work.
+    ε':\bar ε')`, so that its mean is the mean ε_q. Displacements are taken to the
+    image nearest to the affine motion: positions may be wrapped or not, the cell remapped.
 
     Args:
-        before: first state, with a cell; positions not wrapped.
-        after: second state, the same grains; a strain below about 0.4 between the two.
+        before: first state, with a cell.
+        after: second state, the same grains; a strain below about 0.3 between the two.
         cells: boxes along each axis; default such that a box holds about 25 grains.
     Returns:
         Over ``box``: count, eps_q, eps_q_error (standard error from the scatter of its own
@@ -92,19 +92,22 @@ def homogeneity(strain: xr.Dataset | tuple[Packing, Packing]) -> Mapping[str, fl
 
 
 def _displacements(before: Packing, after: Packing) -> tuple[Array, Array, Array]:
-    """Wrapped positions, their fractions of the cell, displacements of the wrapped images."""
+    """Wrapped positions, their fractions of the cell, displacements up to a constant."""
     first = require(before.cell, "cell lengths", "give the cell of the packing")
     second = require(after.cell, "cell lengths", "give the cell of the packing")
     old, new = (require(state.grains.number, "grain numbers") for state in (before, after))
     if not np.array_equal(old, new):
         raise InvalidPacking("the two states hold different grains, so nothing can be compared")
-    place, turns = wrap(before.grains.position, first)
+    place = wrap(before.grains.position, first)[0]
     # A sheared cell may have been remapped: its lattice vectors are then integer combinations
     # of the deformed ones; rounding recovers them while the strain is well below a half.
-    combination = np.rint(np.linalg.solve(second.matrix, first.matrix))
-    deformed = second.matrix @ combination
-    moved = after.grains.position - turns @ deformed.T
-    return place, cell_fractions(place, first), moved - place
+    deformed = second.matrix @ np.rint(np.linalg.solve(second.matrix, first.matrix))
+    fraction = cell_fractions(place, first)
+    affine = fraction @ deformed.T
+    other = after.grains.position - affine
+    other = other - other[0]
+    turns = np.rint(np.linalg.solve(deformed, other.T).T) * np.array(first.periodic)
+    return place, fraction, affine + other - turns @ deformed.T - place
 
 
 def _fit(place: Array, displacement: Array) -> tuple[Array, Array]:
