@@ -61,6 +61,15 @@ def test_fabric_uses_the_contacts_of_the_z_in_use():
     assert core["z_backbone"] == 2
     # Two contacts along x and two at ±60°: <cos 2θ> = (2 − 1)/4.
     assert everything["a_signed"] == pytest.approx(0.5)
+    # z_mechanical counts the floater's contact for the grain that it touches: (8 − 1)/(4 − 1).
+    touched = measure(
+        packing, criterion="gap:0.01", direction=np.array([1.0, 0]), z_definition="z_mechanical"
+    )
+    assert touched["a_signed"] == pytest.approx(0.5)
+    assert touched["z_mechanical"] == pytest.approx(7 / 3)
+    # Errors of independent contacts: three of them in the core, four in all.
+    assert core["a_noise"] == pytest.approx(np.sqrt(2 / 3))
+    assert everything["a_noise"] == pytest.approx(np.sqrt((2 - 0.5**2) / 4))
     assert everything["z"] == 2.0
     assert everything["rattler_fraction"] == 0.25
 
