@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import re
 import textwrap
 from pathlib import Path
 from types import ModuleType
@@ -16,25 +17,17 @@ HEAD = """# Public interface
 Everything here is `granufab.<name>`; it loads on first use. Signatures are the code's own.
 Rewritten by `make docs`; a test compares this page with the code.
 """
+WIDTH = 92
 
 
 def signature(value: Any) -> str:
-    """The signature of a function, or the fields of a class, as its source has them."""
+    """The signature of a function, or the fields and methods of a class, as the source has them."""
     node = ast.parse(textwrap.dedent(inspect.getsource(value))).body[0]
     if isinstance(node, ast.FunctionDef):
         return _function(node)
     assert isinstance(node, ast.ClassDef)
-    lines = [_head(node)]
-    for item in node.body:
-        if isinstance(item, ast.AnnAssign) and not ast.unparse(item.target).startswith("_"):
-            lines.append("    " + _field(item))
-        elif isinstance(item, ast.FunctionDef) and not item.name.startswith("_"):
-            decorators = [ast.unparse(d) for d in item.decorator_list]
-            if "property" in decorators:
-                lines.append(f"    {item.name} -> {ast.unparse(item.returns or ast.Constant(None))}")
-            elif not any("validator" in d for d in decorators):
-                lines.append("    " + _function(item))
-    return "\n".join(lines)
+    lines = [line for item in node.body for line in _member(item)]
+    return "\n".join([_head(node), *(textwrap.indent(line, "    ") for line in lines)])
 
 
 def _head(node: ast.ClassDef) -> str:
@@ -42,38 +35,62 @@ def _head(node: ast.ClassDef) -> str:
     return f"class {node.name}({bases}):" if bases else f"class {node.name}:"
 
 
-def _field(item: ast.AnnAssign) -> str:
-    text = f"{ast.unparse(item.target)}: {ast.unparse(item.annotation)}"
-    value = item.value
-    if isinstance(value, ast.Call) and ast.unparse(value.func) in ("Field", "field"):
-        value = value.args[0] if value.args else None
-    return text if value is None else f"{text} = {ast.unparse(value)}"
+def _member(item: ast.stmt) -> list[str]:
+    if isinstance(item, ast.AnnAssign) and not ast.unparse(item.target).startswith("_"):
+        return [_named(ast.unparse(item.target), item.annotation, _default(item.value))]
+    if not isinstance(item, ast.FunctionDef) or item.name.startswith("_"):
+        return []
+    decorators = [ast.unparse(decorator) for decorator in item.decorator_list]
+    if any("validator" in decorator for decorator in decorators):
+        return []
+    if "property" in decorators:
+        return [_named(item.name, item.returns, None)]
+    return [_function(item, method=True)]
 
 
-def _function(node: ast.FunctionDef) -> str:
+def _default(value: ast.expr | None) -> ast.expr | None:
+    """The default behind a call of ``Field`` or ``field``, if it is one."""
+    if not isinstance(value, ast.Call) or ast.unparse(value.func) not in ("Field", "field"):
+        return value
+    named = [keyword.value for keyword in value.keywords if keyword.arg == "default"]
+    return named[0] if named else None
+
+
+def _function(node: ast.FunctionDef, *, method: bool = False) -> str:
+    parts = _parameters(node.args)[1 if method else 0 :]
     returns = f" -> {ast.unparse(node.returns)}" if node.returns else ""
-    line = f"{node.name}({ast.unparse(node.args)}){returns}"
-    if len(line) <= 96:
+    line = f"{node.name}({', '.join(parts)}){returns}"
+    if len(line) <= WIDTH:
         return line
-    parts = _split(ast.unparse(node.args))
     return f"{node.name}(\n" + "".join(f"    {part},\n" for part in parts) + f"){returns}"
 
 
-def _split(arguments: str) -> list[str]:
-    """Split at the commas outside brackets."""
-    parts, depth, current = [], 0, ""
-    for letter in arguments:
-        depth += (letter in "([{") - (letter in ")]}")
-        if letter == "," and depth == 0:
-            parts.append(current.strip())
-            current = ""
-        else:
-            current += letter
-    return [*parts, current.strip()]
+def _parameters(arguments: ast.arguments) -> list[str]:
+    positional = [*arguments.posonlyargs, *arguments.args]
+    defaults = [None] * (len(positional) - len(arguments.defaults)) + list(arguments.defaults)
+    parts = [_named(a.arg, a.annotation, d) for a, d in zip(positional, defaults, strict=True)]
+    if arguments.posonlyargs:
+        parts.insert(len(arguments.posonlyargs), "/")
+    if arguments.vararg:
+        parts.append("*" + _named(arguments.vararg.arg, arguments.vararg.annotation, None))
+    elif arguments.kwonlyargs:
+        parts.append("*")
+    for argument, default in zip(arguments.kwonlyargs, arguments.kw_defaults, strict=True):
+        parts.append(_named(argument.arg, argument.annotation, default))
+    if arguments.kwarg:
+        parts.append("**" + _named(arguments.kwarg.arg, arguments.kwarg.annotation, None))
+    return parts
+
+
+def _named(name: str, annotation: ast.expr | None, default: ast.expr | None) -> str:
+    text = f"{name}: {ast.unparse(annotation)}" if annotation else name
+    return f"{text} = {ast.unparse(default)}" if default else text
 
 
 def _first_line(value: Any) -> str:
-    return (inspect.getdoc(value) or "").strip().split("\n")[0]
+    line = (inspect.getdoc(value) or "").strip().split("\n")[0]
+    line = re.sub(r":math:`([^`]*)`", r"$\1$", line)
+    return re.sub(r":\w+:`~?([^`]*)`", r"``\1``", line)
 
 
 def page() -> str:
@@ -88,7 +105,7 @@ def page() -> str:
         elif isinstance(value, str):
             parts.append("The installed version, as text.\n")
         else:
-            parts.append(f"```python\n{signature(value)}\n```\n{_first_line(value)}\n")
+            parts.append(f"```python\n{signature(value)}\n```\n\n{_first_line(value)}\n")
     return "\n".join(parts)
 
 
