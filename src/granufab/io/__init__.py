@@ -1,0 +1,25 @@
+"""Files: the run file, series as CSV, datasets as CSV or NetCDF, summaries as JSON."""
+
+from granufab.io.formats import FORMATS, Format, detect, read
+from granufab.io.provenance import cpu_name, provenance
+from granufab.io.run_file import RunFileWriter
+from granufab.io.run_reader import describe
+from granufab.io.series_csv import read_series, write_dataset, write_series
+from granufab.io.summary import json_text, write_json, write_text
+
+__all__ = [
+    "FORMATS",
+    "Format",
+    "RunFileWriter",
+    "cpu_name",
+    "describe",
+    "detect",
+    "json_text",
+    "provenance",
+    "read",
+    "read_series",
+    "write_dataset",
+    "write_json",
+    "write_series",
+    "write_text",
+]

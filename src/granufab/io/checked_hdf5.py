@@ -1,0 +1,224 @@
+"""Open a run file and read entries of the schema, trusting nothing that it declares."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from granufab.errors import CorruptFile, GranufabError, MissingData, UnknownFormat
+from granufab.io.schema import FORMAT_NAME, SCHEMA_VERSION, Entry, named
+
+__all__ = ["HDF5_SIGNATURE", "CheckedFile", "is_run_file", "opened"]
+
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
+_LARGEST_CHUNK_BYTES = 16 * 2**20
+_LARGEST_RATIO = 1100  # deflate shrinks by 1032 at most, so no dataset declares more than this
+_BROKEN = (
+    OSError,
+    RuntimeError,
+    KeyError,
+    ValueError,
+    TypeError,
+    IndexError,
+    OverflowError,
+    MemoryError,
+)
+
+
+def is_run_file(path: Path, head: bytes) -> bool:
+    """Whether a file is a run file, from its content; HDF5 that cannot be opened may be one.
+
+    Args:
+        path: the file.
+        head: its first bytes.
+    """
+    if not head.startswith(HDF5_SIGNATURE):
+        return False
+    try:
+        file, _ = _open(path)
+        with file:
+            return file.attrs.get("format") == FORMAT_NAME
+    except _BROKEN:
+        return True
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[CheckedFile]:
+    """Open a run file for reading, also while it is written or after its writer was killed.
+
+    Raises:
+        MissingData: there is no such file.
+        UnknownFormat: it is no run file, or of a newer schema.
+        CorruptFile: it is truncated or contradicts itself; what the block meets included.
+    """
+    if not path.is_file():
+        raise MissingData(f"{path}: " + ("is a folder" if path.is_dir() else "no such file"))
+    try:
+        file, unfinished = _open(path)
+        with file:
+            yield CheckedFile(file, path, unfinished)
+    except GranufabError:
+        raise
+    except _BROKEN as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise CorruptFile(f"{path}: cannot be read as a run file ({reason})") from None
+
+
+def _open(path: Path) -> tuple[h5py.File, bool]:
+    with path.open("rb") as stream:
+        if stream.read(len(HDF5_SIGNATURE)) != HDF5_SIGNATURE:
+            raise UnknownFormat(f"{path}: is not an HDF5 file, so not a granufab run file")
+    try:
+        return h5py.File(path, "r", locking=False), False
+    except OSError:
+        pass
+    try:
+        return h5py.File(path, "r", locking=False, swmr=True), True
+    except OSError:
+        raise CorruptFile(
+            f"{path}: cannot be opened; it is truncated, or its writer was stopped before the "
+            "first frame"
+        ) from None
+
+
+class CheckedFile:
+    """An open run file; reads only entries of the schema, as hard links to plain datasets.
+
+    Args:
+        file: the open file.
+        path: for messages.
+        unfinished: whether its writer has not closed it.
+    """
+
+    def __init__(self, file: h5py.File, path: Path, unfinished: bool) -> None:
+        self._file = file
+        self.path = path
+        if file.attrs.get("format") != FORMAT_NAME:
+            raise UnknownFormat(f"{path}: is HDF5, but not a granufab run file")
+        version = self.whole("schema_version")
+        if version > SCHEMA_VERSION:
+            raise UnknownFormat(
+                f"{path}: has schema_version {version}, this granufab reads up to "
+                f"{SCHEMA_VERSION}; update granufab"
+            )
+        self.dimension = self.whole("dimension")
+        self.grain_count = self.whole("grain_count")
+        size = path.stat().st_size
+        if unfinished and size < self.counter("file_bytes"):
+            raise self.corrupt(
+                f"is truncated: {size} bytes of {self.counter('file_bytes')}; copy it again"
+            )
+
+    def corrupt(self, text: str) -> CorruptFile:
+        """The exception for a contradiction in this file."""
+        return CorruptFile(f"{self.path}: {text}")
+
+    def text(self, name: str) -> str:
+        """A text attribute of the root group."""
+        value = self._file.attrs[name]
+        if not isinstance(value, str):
+            raise self.corrupt(f"attribute {name} is not text")
+        return value
+
+    def whole(self, name: str) -> int:
+        """A whole-number attribute of the root group."""
+        value = self._file.attrs[name]
+        if not isinstance(value, np.integer):
+            raise self.corrupt(f"attribute {name} is not a whole number")
+        return int(value)
+
+    def json(self, name: str) -> dict[str, Any]:
+        """A JSON attribute of the root group."""
+        return self.parse_json(self.text(name), name)
+
+    def parse_json(self, text: str, name: str) -> dict[str, Any]:
+        """``text`` as a JSON object."""
+        try:
+            value = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise self.corrupt(f"{name} is not valid JSON ({error})") from None
+        if not isinstance(value, dict):
+            raise self.corrupt(f"{name} is not a JSON object")
+        return value
+
+    def counter(self, name: str) -> int:
+        """A scalar counter, ≥ 0."""
+        value = int(self._dataset(named(name))[()])
+        if value < 0:
+            raise self.corrupt(f"{name} is {value}")
+        return value
+
+    def records(self, counter: str, names: tuple[Entry, ...]) -> int:
+        """Complete records that a counter promises, after checking that all entries hold them."""
+        count = self.counter(counter)
+        started = counter == "complete_frames" and count > 0
+        if started and (self.dimension not in (2, 3) or self.grain_count < 1):
+            raise self.corrupt(f"{self.grain_count} grains in {self.dimension} dimensions")
+        for entry in names:
+            length = len(self._dataset(entry))
+            if length < count:
+                raise self.corrupt(f"{entry.name} holds {length} of {count} records")
+        return count
+
+    def once(self, entry: Entry) -> NDArray | None:
+        """A dataset that does not grow; None where it may be missing and is."""
+        if entry.default == "None" and entry.name not in self._file:
+            return None
+        return self._dataset(entry)[()]
+
+    def rows(self, entry: Entry, first: int, last: int) -> NDArray:
+        """Rows ``first`` to ``last − 1`` of a growing dataset."""
+        data = self._dataset(entry)
+        if not 0 <= first <= last <= len(data):
+            raise self.corrupt(f"{entry.name} holds {len(data)} rows, wanted {first}..{last}")
+        written = data.id.get_storage_size()
+        bytes_ = (last - first) * data.dtype.itemsize * int(np.prod(data.shape[1:]))
+        if written and bytes_ > _LARGEST_RATIO * written:
+            raise self.corrupt(f"{entry.name} declares {bytes_} bytes, {written} are stored")
+        return data[first:last]
+
+    def everything(self, entry: Entry) -> NDArray:
+        """All rows of a growing dataset."""
+        return self.rows(entry, 0, len(self._dataset(entry)))
+
+    def _dataset(self, entry: Entry) -> h5py.Dataset:
+        """The dataset of an entry, after checking link, type, shape, storage and filters."""
+        name = entry.name
+        parts = name.split("/")
+        for depth in range(1, len(parts) + 1):
+            link = self._file.get("/".join(parts[:depth]), getlink=True)
+            if not isinstance(link, h5py.HardLink):
+                raise self.corrupt(f"{name} is missing or a link to elsewhere")
+        data = self._file[name]
+        if not isinstance(data, h5py.Dataset):
+            raise self.corrupt(f"{name} is not a dataset")
+        if data.dtype != np.dtype(entry.dtype):
+            raise self.corrupt(f"{name} has type {data.dtype}, expected {entry.dtype}")
+        fixed = entry.growth in ("scalar", "grains")
+        wanted = entry.row_shape(self.dimension, self.grain_count)
+        shape = data.shape if fixed else data.shape[1:]
+        if shape != wanted or (not fixed and len(data.shape) != len(entry.shape)):
+            raise self.corrupt(f"{name} has shape {data.shape}, expected {wanted} per record")
+        self._check_storage(data, name)
+        return data
+
+    def _check_storage(self, data: h5py.Dataset, name: str) -> None:
+        if data.is_virtual or data.external:
+            raise self.corrupt(f"{name} lies in another file")
+        properties = data.id.get_create_plist()
+        filters = {properties.get_filter(k)[0] for k in range(properties.get_nfilters())}
+        if not filters <= _FILTERS:
+            raise self.corrupt(f"{name} has filters other than gzip, shuffle and fletcher32")
+        if data.chunks is None:
+            if data.id.get_storage_size() < data.nbytes:
+                raise self.corrupt(f"{name} declares {data.nbytes} bytes that are not stored")
+        elif data.dtype.itemsize * int(np.prod(data.chunks)) > _LARGEST_CHUNK_BYTES:
+            raise self.corrupt(f"{name} has chunks of {data.chunks} items, too large")
