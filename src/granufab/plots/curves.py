@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import xarray as xr
 
 from granufab.errors import MissingData
 from granufab.history import Run
-from granufab.packing import Array
+from granufab.packing import Array, IntArray
 
 __all__ = ["LABELS", "Results", "collect", "column", "mean_curve", "running_mean", "stages"]
 
@@ -25,7 +26,7 @@ LABELS: dict[str, str] = {
     "z_backbone": r"$z$ [-]",
     "z_mechanical": r"$z_m$ [-]",
     "a": r"$a$ [-]",
-    "a_signed": r"$a'$ [-]",
+    "a_signed": "$a$\N{PRIME} [-]",
     "q_over_p": r"$q/p$ [-]",
     "phi": r"$\phi$ [-]",
 }
@@ -102,11 +103,11 @@ def stages(series: xr.Dataset) -> list[slice]:
     edges = [0, *turns.tolist(), len(strain) - 1]
     if len(strain) == 1:
         return [slice(0, 1)]
-    return [slice(low, high + 1) for low, high in zip(edges[:-1], edges[1:], strict=True)]
+    return [slice(low, high + 1) for low, high in pairwise(edges)]
 
 
 def running_mean(strain: Array, value: Array, window: float) -> tuple[Array, Array]:
-    """Running mean and standard deviation over a window of strain.
+    """Running mean over a window of strain, and the scatter about it in the window.
 
     The window is centred and shrinks towards both ends, so that the first and last records keep
     their own values.
@@ -123,20 +124,17 @@ def running_mean(strain: Array, value: Array, window: float) -> tuple[Array, Arr
     reach = np.minimum(window / 2, np.minimum(travelled, travelled[-1] - travelled))
     low = np.searchsorted(travelled, travelled - reach - 1e-12, side="left")
     high = np.searchsorted(travelled, travelled + reach + 1e-12, side="right")
+    mean = _window_mean(value, low, high)
+    return mean, np.sqrt(_window_mean((value - mean) ** 2, low, high))
+
+
+def _window_mean(value: Array, low: IntArray, high: IntArray) -> Array:
     known = np.isfinite(value)
-    # Sums of differences from the mean keep the variance free of cancellation.
-    offset = float(value[known].mean()) if known.any() else 0.0
-    filled = np.where(known, value - offset, 0.0)
-    number = _windowed(known.astype(float), low, high)
+    total = np.concatenate(([0.0], np.cumsum(np.where(known, value, 0.0))))
+    number = np.concatenate(([0], np.cumsum(known)))
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = _windowed(filled, low, high) / number
-        square = _windowed(filled**2, low, high) / number
-    return mean + offset, np.sqrt(np.maximum(square - mean**2, 0.0))
-
-
-def _windowed(value: Array, low: Array, high: Array) -> Array:
-    total = np.concatenate(([0.0], np.cumsum(value)))
-    return total[high] - total[low]
+        mean = (total[high] - total[low]) / (number[high] - number[low])
+    return np.where(high - low == 1, value, mean)
 
 
 def mean_curve(

@@ -31,7 +31,7 @@ def homogeneity(strain: xr.Dataset, *, ax: Axes | None = None) -> Axes:
     column, row = np.clip((strain["centre"].to_numpy() * side).astype(int), 0, side - 1).T
     field[row, column] = local / mean
     with style():
-        ax = ax if ax is not None else new_figure(height=2.9)[1][0]
+        ax = ax if ax is not None else new_figure(height=2.7)[1][0]
         reach = max(1.0, float(np.nanmax(np.abs(field - 1))))
         image = ax.imshow(
             field,
@@ -43,7 +43,7 @@ def homogeneity(strain: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         )
         figure = ax.get_figure(root=True)
         assert figure is not None
-        bar = figure.colorbar(image, ax=ax, shrink=0.9, pad=0.03)
+        bar = figure.colorbar(image, ax=ax, shrink=0.78, pad=0.03)
         bar.set_label(r"$\varepsilon_q^{\mathrm{loc}}/\varepsilon_q$ [-]")
         bar.outline.set_linewidth(0.6)  # pyright: ignore[reportCallIssue]
         ax.set_xlabel(r"$x/L_x$ [-]")

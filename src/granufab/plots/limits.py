@@ -40,8 +40,11 @@ def limit_lines(
     z = np.linspace(max(low, 1e-3), high, 400)
     loss, gain = _lines(domain, z, scaled)
     dash = (0, (5, 2))
-    ax.plot(z, loss, color=colour, lw=0.8, ls="-" if shade else dash, zorder=2)
-    ax.plot(z, gain, color=colour, lw=0.8, ls="-" if shade else dash, zorder=2)
+    if not shade:
+        # Several domains in one panel stay readable if each line ends at its critical state.
+        loss, gain = (np.where(line <= 1.02 * apex, line, np.nan) for line in (loss, gain))
+    for line in (loss, gain):
+        ax.plot(z, line, color=colour, lw=0.8, ls="-" if shade else dash, zorder=2)
     if shade:
         inside = np.minimum(loss, gain)
         ax.fill_between(z, 0, np.maximum(inside, 0), color=FIT, alpha=0.12, lw=0, zorder=0.5)
@@ -76,7 +79,7 @@ def critical_marker(
         ax: the panel.
         limits: a domain or a fit.
         scaled: the ordinate is a z instead of a.
-        colour: edge of the star.
+        colour: edge of the star; the error bars have it too.
         label: enter it in the legend.
     """
     domain = as_domain(limits)
@@ -97,8 +100,9 @@ def critical_marker(
         [state[0]],
         [state[1]],
         "*",
-        ms=9,
-        mfc="#f7d84a",
+        color=colour,
+        ms=9 if label else 7.5,
+        mfc="#f7d84a" if label else "white",
         mec=colour,
         mew=0.7,
         zorder=5,

@@ -58,7 +58,7 @@ def mohr(
         ax.set_xlabel(r"$G_n$ [-]")
         ax.set_ylabel(r"$G_t$ [-]")
         if ax.get_legend_handles_labels()[0]:
-            ax.legend(loc="upper left")
+            ax.legend(loc="upper center", ncols=2)
     return ax
 
 
@@ -74,7 +74,7 @@ def _draw_limits(ax: Axes, domain: AccessibleDomain) -> None:
             ha="right" if side < 0 else "left",
         )
     low, high = (circle.centre for circle in limit_circles(domain))
-    ax.update_datalim([(low - 0.25 * width, -0.6 * width), (high + 0.25 * width, 0.6 * width)])
+    ax.update_datalim([(low - 0.25 * width, -0.5 * width), (high + 0.25 * width, 0.7 * width)])
     ax.autoscale_view()
 
 

@@ -10,8 +10,8 @@ from matplotlib.patches import Polygon
 from granufab.errors import MissingData
 from granufab.fabric import select_contacts
 from granufab.fabric.neighbours import wrap
-from granufab.packing import Array, Cell, Contacts, Packing, require
-from granufab.plots.style import INK, new_figure, style
+from granufab.packing import Array, Cell, Contacts, IntArray, Packing, require
+from granufab.plots.style import COLUMN, INK, new_figure, style
 
 __all__ = ["network"]
 
@@ -20,7 +20,7 @@ def network(
     packing: Packing,
     *,
     criterion: str = "force",
-    width: float = 0.22,
+    width: float = 0.2,
     outlines: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -46,10 +46,12 @@ def network(
         raise MissingData("the contact network is drawn for disks; this packing is 3D")
     contacts = select_contacts(packing, criterion)
     with style():
-        ax = ax if ax is not None else new_figure(height=3.3)[1][0]
         corners = _corners(packing)
+        extent = np.ptp(corners, axis=0)
+        if ax is None:
+            ax = new_figure(height=COLUMN * min(extent[1] / extent[0], 2.0))[1][0]
         ax.set_aspect("equal")
-        pad = 0.01 * np.ptp(corners, axis=0).max()
+        pad = 0.01 * extent.max()
         ax.set_xlim(corners[:, 0].min() - pad, corners[:, 0].max() + pad)
         ax.set_ylim(corners[:, 1].min() - pad, corners[:, 1].max() + pad)
         outline = Polygon(corners, closed=True, fill=False, ec=INK, lw=0.6, zorder=4)
@@ -73,7 +75,7 @@ def _corners(packing: Packing) -> Array:
     return np.array([low, [high[0], low[1]], high, [low[0], high[1]]])
 
 
-def _images(points: Array, reach: Array, cell: Cell | None) -> tuple[Array, Array]:
+def _images(points: Array, reach: Array, cell: Cell | None) -> tuple[IntArray, Array]:
     """Index and shift of each periodic copy whose circle of radius ``reach`` enters the cell."""
     index = [np.arange(len(points))]
     shift = [np.zeros_like(points)]

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.typing import ColorType
 
-from granufab.plots.curves import LABELS, Results, collect, mean_curve
+from granufab.plots.curves import LABELS, Results, collect, column, mean_curve
 from granufab.plots.limits import Limits, critical_marker, limit_lines
 from granufab.plots.style import new_figure, style
 
@@ -65,7 +66,7 @@ def draw_paths(
         colour = line.get_color()
         start = []
         for series in repeats:
-            z, a = (series[name].values.astype(float) for name in (z_definition, "a_signed"))
+            z, a = (column(series, name) for name in (z_definition, "a_signed"))
             ax.plot(z, a * z if scaled else a, color=colour, lw=0.4, alpha=0.35, zorder=1.5)
             start.append((z[0], a[0] * z[0] if scaled else a[0]))
         z_curves = mean_curve(repeats, z_definition, against="eps_q_total", window=window)
@@ -77,17 +78,17 @@ def draw_paths(
     _fit_view(ax, groups, z_definition, scaled)
 
 
-def _mark_start(ax: Axes, start: Sequence[tuple[float, float]], colour: str) -> None:
+def _mark_start(ax: Axes, start: Sequence[tuple[float, float]], colour: ColorType) -> None:
     z, ordinate = np.mean(start, axis=0)
-    ax.plot([z], [ordinate], "o", mfc="white", mec=colour, mew=1.0, ms=4.5, zorder=4)
+    ax.plot([z], [ordinate], "o", color=colour, mfc="white", mec=colour, mew=1.0, ms=4.5, zorder=4)
 
 
 def _fit_view(
     ax: Axes, groups: dict[str, list[xr.Dataset]], z_definition: str, scaled: bool
 ) -> None:
     every = [series for repeats in groups.values() for series in repeats]
-    z = np.concatenate([series[z_definition].values for series in every])
-    a = np.concatenate([series["a_signed"].values for series in every])
+    z = np.concatenate([column(series, z_definition) for series in every])
+    a = np.concatenate([column(series, "a_signed") for series in every])
     ordinate = a * z if scaled else a
     low, high = float(np.nanmin(z)), float(np.nanmax(z))
     top, bottom = float(np.nanmax(ordinate)), min(float(np.nanmin(ordinate)), 0.0)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.typing import ColorType
 
 from granufab.errors import MissingData
 from granufab.plots.style import FIT, new_figure, style
@@ -32,7 +33,7 @@ def rose(orientations: xr.Dataset | Mapping[str, xr.Dataset], *, ax: Axes | None
     """
     several = {"": orientations} if isinstance(orientations, xr.Dataset) else orientations
     with style():
-        ax = ax if ax is not None else new_figure(height=3.3, projection="polar")[1][0]
+        ax = ax if ax is not None else new_figure(height=2.9, projection="polar")[1][0]
         top = 0.0
         for index, (label, data) in enumerate(several.items()):
             if "phase" not in data:
@@ -47,7 +48,7 @@ def rose(orientations: xr.Dataset | Mapping[str, xr.Dataset], *, ax: Axes | None
     return ax
 
 
-def _draw(ax: Axes, data: xr.Dataset, label: str, marker: str, colour: str) -> None:
+def _draw(ax: Axes, data: xr.Dataset, label: str, marker: str, colour: ColorType) -> None:
     theta = data["theta"].to_numpy()
     whole = np.concatenate([theta, theta + np.pi])
     value, error = (np.tile(data[name].to_numpy(), 2) for name in ("E", "E_error"))
@@ -77,6 +78,8 @@ def _dress(ax: Axes, top: float) -> None:
     ax.set_xticks(np.radians(np.arange(0, 360, 45)))
     ax.minorticks_off()
     ax.tick_params(axis="y", labelcolor=FIT, labelsize=8)
-    ax.tick_params(axis="x", pad=0)
+    ax.tick_params(axis="x", pad=1)
+    for label in ax.get_yticklabels():
+        label.set_bbox({"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.6})
     ax.set_rlabel_position(68)  # pyright: ignore[reportAttributeAccessIssue]
     ax.set_ylabel(r"$E(\theta)$ [rad$^{-1}$]", labelpad=24)

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from granufab.plots.curves import LABELS, Results, collect, column, mean_curve, stages
-from granufab.plots.style import FIT, new_figure, style
+from granufab.plots.style import FIT, letter_panels, new_figure, style
 
 __all__ = ["series"]
 
@@ -59,7 +59,8 @@ def series(
             r"cumulative $\varepsilon_q$ [-]" if against == "eps_q_total" else LABELS["eps_q"]
         )
         panels[0].legend(loc="best")
-        _letter(panels)
+        if len(panels) > 1:
+            letter_panels(panels)
     return panels
 
 
@@ -85,12 +86,3 @@ def _mark_reversals(panel: Axes, groups: dict[str, list[xr.Dataset]], against: s
     last = max(float(np.nanmax(column(r[0], against))) for r in groups.values())
     first = min(float(np.nanmin(column(r[0], against))) for r in groups.values())
     panel.set_xlim(first - 0.01 * (last - first), last + 0.01 * (last - first))
-
-
-def _letter(panels: Sequence[Axes]) -> None:
-    if len(panels) < 2:
-        return
-    for letter, panel in zip("abcdef", panels, strict=False):
-        panel.text(
-            0.025, 0.955, f"({letter})", transform=panel.transAxes, va="top", ha="left", zorder=5
-        )

@@ -6,7 +6,7 @@ display is needed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 from granufab.errors import GranufabError
 
-__all__ = ["COLUMN", "COLOURS", "FIT", "INK", "new_figure", "save", "style"]
+__all__ = ["COLOURS", "COLUMN", "FIT", "INK", "letter_panels", "new_figure", "save", "style"]
 
 COLUMN = 84 / 25.4
 """Width of a journal column [inch]."""
@@ -33,7 +33,7 @@ INK = "#222222"
 FIT = "#777777"
 """Accessible domain and its uncertainty."""
 
-_RC: dict[str, Any] = {
+_RC: dict[Any, Any] = {
     "font.family": ["STIXGeneral", "DejaVu Serif"],
     "mathtext.fontset": "stix",
     "font.size": 9,
@@ -66,7 +66,11 @@ _RC: dict[str, Any] = {
     "lines.linewidth": 1.1,
     "lines.markersize": 4,
     "lines.solid_capstyle": "round",
-    "legend.frameon": False,
+    "legend.frameon": True,
+    "legend.framealpha": 0.85,
+    "legend.edgecolor": "none",
+    "legend.fancybox": False,
+    "legend.borderpad": 0.2,
     "legend.handlelength": 1.5,
     "legend.handletextpad": 0.5,
     "legend.labelspacing": 0.25,
@@ -105,6 +109,7 @@ def new_figure(
     height: float | None = None,
     rows: int = 1,
     share: bool = True,
+    ratios: Sequence[float] | None = None,
     **subplot: Any,
 ) -> tuple[Figure, list[Axes]]:
     """An empty figure in the house style.
@@ -114,6 +119,7 @@ def new_figure(
         height: [inch]; by default 0.78 of the width for each row.
         rows: number of panels, one above another.
         share: the panels have a common abscissa.
+        ratios: relative heights of the panels, equal by default.
         subplot: passed to ``Figure.add_subplot``.
     Returns:
         The figure and its panels from top to bottom.
@@ -122,10 +128,11 @@ def new_figure(
         size = (width, height if height is not None else 0.78 * width * rows)
         figure = _ColumnFigure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
+        grid = figure.add_gridspec(rows, 1, height_ratios=ratios)
         axes: list[Axes] = []
         for row in range(rows):
             first = axes[0] if axes and share else None
-            axes.append(figure.add_subplot(rows, 1, row + 1, sharex=first, **subplot))
+            axes.append(figure.add_subplot(grid[row], sharex=first, **subplot))
     return figure, axes
 
 
@@ -146,3 +153,11 @@ def save(figure: Figure, stem: Path | str) -> tuple[Path, Path]:
     except OSError as error:
         raise GranufabError(f"{stem}: the figure cannot be written ({error})") from None
     return files
+
+
+def letter_panels(panels: Sequence[Axes]) -> None:
+    """Name panels (a), (b)… in their lower left corners."""
+    with style():
+        for letter, panel in zip("abcdefgh", panels, strict=False):
+            where = {"transform": panel.transAxes, "va": "bottom", "ha": "left", "zorder": 5}
+            panel.text(0.025, 0.045, f"({letter})", **where)

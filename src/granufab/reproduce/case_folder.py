@@ -57,20 +57,23 @@ def run_into_folder(
             "choose another folder, or --force to replace it"
         )
     check_writable(folder)
-    if run_case is None:
-        from granufab.simulate import run_case as simulate_case
-
-        run_case = simulate_case
+    simulate = run_case or _simulator()
     for name in held:
         (folder / name).unlink()
     write_text(to_toml(case), folder / "settings.toml")
     settings = case.model_dump(mode="json")
     with RunFileWriter(folder / "run.h5", settings=settings, force=True) as recorder:
-        run = run_case(case, record=recorder, progress=progress)
+        run = simulate(case, record=recorder, progress=progress)
         recorder.close(None if run.summary.get("interrupted") else run.summary)
     write_series(run.series, folder / "series.csv", case.name)
     write_json(_summary(case, run), folder / "summary.json")
     return run
+
+
+def _simulator() -> RunCase:
+    from granufab.simulate import run_case  # compiles kernels: only where something is simulated
+
+    return run_case
 
 
 def _summary(case: Case, run: Run) -> dict[str, Any]:

@@ -130,10 +130,10 @@ def _leave(
 
 def _joined(runs: Mapping[str, list[Run]]) -> xr.Dataset:
     """All series, one after another; the coordinate ``path`` names each record's path."""
-    parts = []
+    parts: list[xr.Dataset] = []
     for name, repeats in runs.items():
         for index, run in enumerate(repeats):
             label = name if len(repeats) == 1 else f"{name}-s{index + 1}"
             records = ("record", [label] * run.series.sizes["record"])
             parts.append(run.series.drop_vars("path", errors="ignore").assign_coords(path=records))
-    return xr.concat(parts, dim="record", combine_attrs="drop")
+    return xr.concat(parts, dim="record", combine_attrs="drop", join="exact")

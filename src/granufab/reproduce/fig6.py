@@ -9,12 +9,13 @@ from matplotlib.figure import Figure
 
 from granufab.plots import mohr as draw_circles
 from granufab.plots import new_figure
+from granufab.plots.style import letter_panels
 from granufab.reproduce.recipe import Outcome, PathRecipe, Recipe, column
 from granufab.states import MohrCircle, critical_circle, mohr
 
 __all__ = ["RECIPE"]
 
-STRAINS = (0.02, 0.05)
+STRAIN = 0.02
 """Where the circles of the first panel are taken [-]."""
 
 HALF_WINDOW = 0.005
@@ -24,10 +25,7 @@ HALF_WINDOW = 0.005
 def _circles(outcome: Outcome) -> dict[str, MohrCircle]:
     circles = {}
     for path in outcome.recipe.paths:
-        label = outcome.labels[path.name]
-        for strain in STRAINS:
-            z, a = _state(outcome, path.name, strain)
-            circles[rf"{label}, $\varepsilon_q = {strain:g}$"] = mohr(z, a)
+        circles[outcome.labels[path.name]] = mohr(*_state(outcome, path.name, STRAIN))
     return circles
 
 
@@ -43,10 +41,11 @@ def _state(outcome: Outcome, name: str, strain: float) -> tuple[float, float]:
 
 
 def _draw(outcome: Outcome) -> Figure:
-    figure, panels = new_figure(rows=2, height=4.4, share=False)
+    figure, panels = new_figure(rows=2, height=4.1, share=False, ratios=(1.2, 1))
     fit = outcome.fits["critical"]
     draw_circles(_circles(outcome), domain=fit, critical=False, ax=panels[0])
     draw_circles(domain=fit, ax=panels[1])
+    letter_panels(panels)
     return figure
 
 
@@ -56,6 +55,7 @@ def _extra(outcome: Outcome) -> dict[str, Any]:
     return {
         "mohr": {
             "critical": {"centre": circle.centre, "radius": circle.radius},
+            "eps_q": STRAIN,
             "tangent_angle_degrees": float(np.degrees(domain.tangent_angle)),
             "circles": [
                 {"label": label, "z": c.z, "a": c.a, "centre": c.centre, "radius": c.radius}

@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from granufab.history import Run
-from granufab.packing import Array
+from granufab.packing import Array, IntArray
 from granufab.plots.curves import running_mean
 from granufab.reproduce.recipe import column, first_stage, last_stage
 from granufab.states.bootstrap import autocorrelation_time, block_length
@@ -160,7 +160,7 @@ def _drawn(stage: _Stage, random: np.random.Generator) -> tuple[Array, Array]:
     return _smooth_mean(stage.strain, np.array(z)), _smooth_mean(stage.strain, np.array(a))
 
 
-def _blocks(stage: _Stage, repeat: int, random: np.random.Generator) -> Array:
+def _blocks(stage: _Stage, repeat: int, random: np.random.Generator) -> IntArray:
     """Rows of the plateau, in blocks as long as its memory, one for each record of the stage."""
     late = stage.z[repeat][stage.plateau]
     length = block_length(autocorrelation_time(late), len(late))

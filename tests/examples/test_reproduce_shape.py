@@ -1,0 +1,312 @@
+"""The shape of what ``reproduce`` and ``run`` leave, with a synthetic simulation in its place."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from synthetic_run import A_STAR, Z_STAR, failing_run, synthetic_run
+
+from granufab.errors import GranufabError, InvalidSettings, NotConverged
+from granufab.history import SERIES_UNITS
+from granufab.io import read
+from granufab.reproduce import FIGURES, reproduce, run_into_folder
+from granufab.reproduce.case_folder import RUN_FILES
+from granufab.reproduce.out_folder import prepare_out_folder
+from granufab.simulate.settings import Case, Sample, load_case
+
+HERE = Path(__file__).parent
+KEYS = {
+    "granufab", "settings", "seed", "criterion", "z_definition", "paths", "fit", "solver",
+    "wall_seconds",
+}  # fmt: skip
+SOLVER_KEYS = {
+    "tolerance", "residual_max", "sweeps_mean", "nonconverged_steps", "steps", "overlap_max",
+    "contact_updates", "seconds", "inertial_number", "stiffness",
+}  # fmt: skip
+
+
+def _reproduce(figure: str, out: Path, **options: Any) -> dict[str, Any]:
+    return reproduce(figure, out=out, run_case=synthetic_run, workers=1, **options)
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, dict[str, Any]]]:
+    root = tmp_path_factory.mktemp("figures")
+    return {name: (root / name, _reproduce(name, root / name)) for name in FIGURES}
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_every_promised_file_is_there(figure: str, results: Any) -> None:
+    folder, result = results[figure]
+    promised = {f"{figure}{end}" for end in (".pdf", ".png", ".json", ".csv")}
+    assert {entry.name for entry in folder.iterdir()} == promised | {"summary.json", "runs"}
+    stored = json.loads((folder / f"{figure}.json").read_text())
+    assert stored == result
+    assert json.loads((folder / "summary.json").read_text()) == {figure: stored}
+    for path in result["paths"]:
+        files = {entry.name for entry in (folder / "runs" / path["name"]).iterdir()}
+        assert files == set(RUN_FILES)
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_the_json_has_the_promised_keys(figure: str, results: Any) -> None:
+    result = results[figure][1]
+    assert set(result) >= KEYS
+    assert set(result["solver"]) >= SOLVER_KEYS
+    assert all(result["solver"][key] is not None for key in SOLVER_KEYS)
+    assert list(result["fit"]) == ["default", "envelope", "lines"]
+    assert result["fit"]["default"]["method"] == "critical"
+    for fit in result["fit"].values():
+        for name in ("z_min", "z_max"):
+            assert fit[name]["low"] <= fit[name]["value"] <= fit[name]["high"]
+    for path in result["paths"]:
+        assert isinstance(path["z_0"], float)
+        for name in ("z_star", "a_star"):
+            assert path[name]["low"] <= path[name]["value"] <= path[name]["high"]
+
+
+@pytest.mark.parametrize("figure", ["fig5", "fig6", "fig7"])
+def test_the_fit_gives_back_the_critical_state(figure: str, results: Any) -> None:
+    result = results[figure][1]
+    fit = result["fit"]["default"]
+    assert fit["z_min"]["value"] == pytest.approx(Z_STAR * (1 - A_STAR / 2), abs=0.02)
+    assert fit["z_max"]["value"] == pytest.approx(Z_STAR * (1 + A_STAR / 2), abs=0.02)
+    for path in result["paths"]:
+        assert path["z_star"]["value"] == pytest.approx(Z_STAR, abs=0.02)
+        assert path["a_star"]["value"] == pytest.approx(A_STAR, abs=0.02)
+
+
+def test_paths_start_where_the_paper_says(results: Any) -> None:
+    starts = {name: [p["z_0"] for p in r["paths"]] for name, (_, r) in results.items()}
+    assert starts["fig5"] == [4.0, 3.3]
+    assert starts["fig7"] == starts["fig6"] == [3.7, 3.1]
+    assert starts["fig8"] == [3.72] * 5
+    grains = {name: r["settings"]["grain_count"] for name, (_, r) in results.items()}
+    assert grains == {"fig5": 5000, "fig6": 5000, "fig7": 5000, "fig8": 13000}
+
+
+def test_the_series_file_holds_every_path(results: Any) -> None:
+    folder, result = results["fig5"]
+    with (folder / "fig5.csv").open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert list(rows[0]) == ["path", *SERIES_UNITS]
+    counts = {path["name"]: 0 for path in result["paths"]}
+    for row in rows:
+        counts[row["path"]] += 1
+    assert counts == {"dense": 301, "loose": 151}
+    assert float(rows[300]["eps_q"]) == pytest.approx(0.0, abs=1e-9)
+    assert float(rows[300]["eps_q_total"]) == pytest.approx(0.6)
+
+
+def test_fig5_measures_the_dip_and_the_reversal(results: Any) -> None:
+    result = results["fig5"][1]
+    dip, turn = result["dip"], result["reversal"]
+    assert abs(dip["depth"]["value"]) < 0.03  # the synthetic dense path has none
+    assert turn["a_signed_plateau"]["value"] == pytest.approx(-A_STAR, abs=0.02)
+    # a' = −a* + 2 a* exp(−s/0.025) crosses 0 at 0.025 ln 2.
+    assert turn["strain_to_zero"]["value"] == pytest.approx(0.025 * np.log(2), abs=0.003)
+    assert turn["z_dip"]["value"] == pytest.approx(0.2, abs=0.05)
+    for entry in (dip["depth"], turn["z_dip"], turn["strain_to_zero"]):
+        assert entry["low"] <= entry["value"] <= entry["high"]
+        assert entry["low"] < entry["high"]
+
+
+def test_fig8_fits_each_friction(results: Any) -> None:
+    fits = results["fig8"][1]["fits"]
+    assert [fit["friction"] for fit in fits] == [0.1, 0.3, 0.5, 0.7, 0.9]
+    z_star = [fit["z_star"]["value"] for fit in fits]
+    expected = [Z_STAR - 0.25 * (fit["friction"] - 0.4) for fit in fits]
+    np.testing.assert_allclose(z_star, expected, atol=0.02)
+    chosen = results["fig8"][1]["fit"]["default"]
+    assert chosen["from"] == "mu0.5"
+    assert chosen["z_star"] == fits[2]["z_star"]
+
+
+def test_fig8_shears_one_sample(results: Any) -> None:
+    cases = results["fig8"][1]["settings"]["cases"].values()
+    samples = [case["sample"] for case in cases]
+    assert all(sample == samples[0] for sample in samples)
+
+
+def test_quick_changes_the_size_and_not_the_tolerance(
+    tmp_path: Path, results: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    quick = reproduce("fig7", quick=True, run_case=synthetic_run, workers=1)
+    assert quick["settings"]["grain_count"] == 1000
+    assert quick["solver"]["tolerance"] == results["fig7"][1]["solver"]["tolerance"]
+    assert (tmp_path / "granufab-fig7" / "fig7.pdf").stat().st_size > 5000
+
+
+def test_seeds_repeat_every_path_independently_and_in_worker_processes(tmp_path: Path) -> None:
+    lines: list[tuple[str, float]] = []
+    result = reproduce(
+        "fig7", out=tmp_path / "out", grains=50, seeds=2, workers=2, run_case=synthetic_run,
+        progress=lambda text, share: lines.append((text, share)),
+    )  # fmt: skip
+    assert result["settings"]["grain_count"] == 50
+    names = sorted(entry.name for entry in (tmp_path / "out" / "runs").iterdir())
+    assert names == ["dense-s1", "dense-s2", "loose-s1", "loose-s2"]
+    seeds = [tuple(path["seeds"]) for path in result["paths"]]
+    assert seeds[0] == seeds[1]
+    assert len(set(seeds[0])) == 2
+    assert result["fit"]["default"]["between_seeds"] is not None
+    shares = [share for _, share in lines]
+    assert shares == sorted(shares)
+    assert lines[-1] == ("done", 1.0)
+    assert any("shear" in text for text, _ in lines)
+
+
+def test_a_failed_path_is_named_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(NotConverged) as caught:
+        reproduce("fig7", out=tmp_path / "out", run_case=failing_run, workers=2)
+    assert str(caught.value).startswith("path loose: coordination 3.1 cannot be reached")
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out" / "fig7.json").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+def test_an_interrupt_ends_every_worker(tmp_path: Path) -> None:
+    code = (
+        f"import sys; sys.path.insert(0, {str(HERE)!r})\n"
+        "from granufab.reproduce import reproduce\n"
+        "from synthetic_run import endless_run\n"
+        "if __name__ == '__main__':\n"
+        "    print('begin', flush=True)\n"
+        f"    reproduce('fig7', out={str(tmp_path / 'out')!r}, run_case=endless_run, workers=2,\n"
+        "              progress=lambda text, share: print(text, flush=True))\n"
+    )
+    script = tmp_path / "script.py"
+    script.write_text(code)
+    process = subprocess.Popen(
+        [sys.executable, str(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    assert process.stdout is not None
+    for line in process.stdout:
+        if "dense: shear" in line and "loose: shear" in line:
+            break
+    os.killpg(process.pid, signal.SIGINT)
+    began = time.monotonic()
+    _, errors = process.communicate(timeout=15)
+    assert time.monotonic() - began < 8
+    assert "KeyboardInterrupt" in errors
+    assert _ends(process.pid), "a process of the group is still alive"
+
+
+def _ends(group: int, patience: float = 5.0) -> bool:
+    for _ in range(round(patience / 0.05)):
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.05)
+    return False
+
+
+@pytest.fixture
+def earlier(tmp_path: Path, results: Any) -> Path:
+    """A folder as ``reproduce fig7`` leaves it."""
+    return Path(shutil.copytree(results["fig7"][0], tmp_path / "earlier"))
+
+
+def test_an_earlier_result_is_replaced(earlier: Path) -> None:
+    assert prepare_out_folder("fig7", earlier) == earlier
+    assert list(earlier.iterdir()) == []
+
+
+def test_foreign_files_need_force_and_stay(earlier: Path) -> None:
+    (earlier / "notes.txt").write_text("mine")
+    before = sorted(earlier.rglob("*"))
+    with pytest.raises(InvalidSettings, match=r"notes\.txt.*force"):
+        prepare_out_folder("fig7", earlier)
+    assert sorted(earlier.rglob("*")) == before
+    prepare_out_folder("fig7", earlier, force=True)
+    assert [entry.name for entry in earlier.iterdir()] == ["notes.txt"]
+
+
+def test_the_default_folder_is_replaced_but_never_what_is_not_ours(
+    earlier: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    default = earlier.rename(tmp_path / "granufab-fig7")
+    (default / "notes.txt").write_text("mine")
+    (default / "runs" / "dense" / "drawing.svg").write_text("mine")
+    prepare_out_folder("fig7", None)
+    assert sorted(entry.name for entry in default.iterdir()) == ["notes.txt", "runs"]
+    assert (default / "runs" / "dense" / "drawing.svg").read_text() == "mine"
+
+
+def test_the_result_of_another_figure_is_foreign(earlier: Path) -> None:
+    with pytest.raises(InvalidSettings, match=r"holds fig7"):
+        prepare_out_folder("fig5", earlier)
+
+
+def test_a_runs_folder_of_someone_else_is_not_touched(tmp_path: Path) -> None:
+    theirs = tmp_path / "out" / "runs" / "a" / "data.bin"
+    theirs.parent.mkdir(parents=True)
+    theirs.write_text("mine")
+    with pytest.raises(InvalidSettings, match="holds runs"):
+        _reproduce("fig7", tmp_path / "out")
+    assert theirs.read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"figure": "fig9"}, "fig9.*known: fig5, fig6, fig7, fig8"),
+        ({"figure": "fig7", "grains": 0}, "grains must be at least 1, got 0"),
+        ({"figure": "fig7", "seeds": 0}, "seeds must be at least 1, got 0"),
+        ({"figure": "fig7", "seed": -1}, "seed must be at least 0, got -1"),
+    ],
+)
+def test_bad_input_is_one_clear_line(tmp_path: Path, options: Any, words: str) -> None:
+    with pytest.raises(InvalidSettings, match=words) as caught:
+        reproduce(out=tmp_path / "out", run_case=synthetic_run, **options)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_said_before_computing(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for out in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(InvalidSettings, match="file"):
+            _reproduce("fig7", out)
+        with pytest.raises(InvalidSettings, match="cannot be written"):
+            run_into_folder(Case(), out, run_case=_never)
+
+
+def _never(*_: Any, **__: Any) -> Any:
+    raise AssertionError("nothing may be computed")
+
+
+def test_a_run_folder_can_be_read_back_and_is_not_overwritten(tmp_path: Path) -> None:
+    case = Case(name="one", sample=Sample(grain_count=100, coordination=3.5, seed=7))
+    run = run_into_folder(case, tmp_path / "one", run_case=synthetic_run)
+    assert {entry.name for entry in (tmp_path / "one").iterdir()} == set(RUN_FILES)
+    assert load_case(tmp_path / "one" / "settings.toml") == case
+    stored = read(tmp_path / "one" / "run.h5")
+    np.testing.assert_array_equal(stored.series["z_backbone"], run.series["z_backbone"])
+    assert json.loads((tmp_path / "one" / "summary.json").read_text())["z_0"] == 3.5
+    before = (tmp_path / "one" / "run.h5").read_bytes()
+    with pytest.raises(InvalidSettings, match=r"run\.h5.*force"):
+        run_into_folder(case, tmp_path / "one", run_case=_never)
+    assert (tmp_path / "one" / "run.h5").read_bytes() == before
+    run_into_folder(case, tmp_path / "one", run_case=synthetic_run, force=True)
+
+
+def test_an_unforeseen_error_in_a_worker_is_one_line_too(tmp_path: Path) -> None:
+    with pytest.raises(GranufabError, match="path dense: AssertionError: nothing may be") as caught:
+        reproduce("fig7", out=tmp_path / "out", run_case=_never, workers=1)
+    assert "\n" not in str(caught.value)
