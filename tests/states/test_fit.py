@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.signal import lfilter
 
 from granufab.errors import InvalidSettings, MissingData
@@ -144,6 +145,14 @@ def test_sign_of_a_and_direction_of_strain_do_not_matter_in_2d(method: Any) -> N
     assert again == one
 
 
+def test_a_table_of_paths_and_labelled_arrays_are_the_same_as_lists() -> None:
+    random = np.random.default_rng(21)
+    table = np.stack([np.stack(relaxing(z_0, random)) for z_0 in (3.1, 3.7)], axis=1)
+    listed = fit_accessible_states(*[list(column) for column in table])
+    labelled = fit_accessible_states(*[xr.DataArray(c, dims=("path", "record")) for c in table])
+    assert fit_accessible_states(*table) == listed == labelled
+
+
 def test_paths_of_unequal_length_and_several_seeds() -> None:
     random = np.random.default_rng(17)
     paths = [relaxing(z_0, random, count=n) for z_0 in (3.1, 3.7) for n in (151, 301, 226)]
@@ -198,6 +207,9 @@ def test_outside_states_are_counted_and_measured() -> None:
         ({"seeds": [1, 2]}, "there are 1 paths"),
         ({"dimension": 3, "a": np.full(301, -0.2)}, "mode='extension'"),
         ({"z": ["x"] * 301}, "not numeric"),
+        ({"z": 3.3}, "z has shape ()"),
+        ({"z": []}, "z has shape (0,)"),
+        ({"a": [np.zeros(301), np.zeros(301)]}, "eps_q holds 1 paths, a holds 2"),
     ],
     ids=lambda value: value if isinstance(value, str) else None,
 )

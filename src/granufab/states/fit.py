@@ -99,18 +99,17 @@ def fit_accessible_states(
 
     ``critical`` (the default) inverts the plateau means z*, a* by eqs. 20–22; ``envelope`` takes
     the largest G_1 and smallest G_D after each path has entered the domain; ``lines`` fits
-    straight limits of the theory's slopes in (z, a·z) to the saturated part. Paths that turn
-    back must be cut at the reversal for the last two.
+    straight limits of the theory's slopes in (z, a·z) to the saturated part. Cut paths at a
+    reversal for the last two.
 
     Args:
         eps_q: strain along the path [-], shape (state_count,), not turning back; or a sequence
             of such series (several paths, seeds or both, of any lengths).
         z: coordination number [-], shaped like ``eps_q``.
-        a: signed anisotropy a' [-], shaped like ``eps_q``; in 2D, in extension and with ``b``
-            either sign counts as forward, whichever the plateau has.
+        a: signed anisotropy a' [-], shaped like ``eps_q``; the plateau's sign counts as forward.
         dimension: 2 or 3.
         mode: axisymmetric loading in 3D.
-        b: (G_2 − G_3)/(G_1 − G_3) in 3D, overrides ``mode``.
+        b: (G_2 − G_3)/(G_1 − G_3) in 3D; overrides ``mode``.
         method: "critical", "envelope" or "lines".
         plateau: None for the last third of each path's strain, a strain to start from, or
             (first, last).
@@ -129,30 +128,16 @@ def fit_accessible_states(
     check_seeds(seeds, len(paths))
     forward_only = dimension == 3 and mode == "compression" and b is None
     paths = [_forward(path, k, forward_only) for k, path in enumerate(paths)]
-
     limits = _METHODS[method](paths, slopes, settings, seeds)
     check_limits(limits.value, method)
-    table = _with_critical(np.vstack([limits.value, limits.draws]), slopes)
-    estimates = {
-        name: interval(table[0, k], table[1:, k], settings.level) for k, name in enumerate(_NAMES)
-    }
-    quick = replace(settings, samples=200)
-
-    def alone(rows: list[int]) -> Array:
-        part: Limits = _METHODS[method]([paths[k] for k in rows], slopes, quick, None)
-        return _with_critical(part.value[None], slopes)[0]
-
-    fraction, significant, worst = _outside(paths, slopes, limits.value)
     return AccessibleFit(
-        **estimates,
-        outside_fraction=fraction,
-        outside_significant=significant,
-        outside_worst=worst,
+        **_estimates(limits, slopes, settings.level),
+        **_outside(paths, slopes, limits.value),
         method=method,
         plateau=tuple(path.window for path in paths),
         block_length=limits.block_length,
         level=settings.level,
-        between_seeds=between_seeds(seeds, alone, _NAMES, settings.level),
+        between_seeds=_between_seeds(paths, slopes, method, settings, seeds),
         dimension=dimension,
         mode=mode,
         b=b,
@@ -179,16 +164,39 @@ def _with_critical(limits: Array, slopes: Slopes) -> Array:
     return np.column_stack([limits, z_star, loss * (1.0 - limits[:, 0] / z_star)])
 
 
-def _outside(
-    paths: Sequence[StatePath], slopes: Slopes, limits: Array
-) -> tuple[float, float, float]:
-    """Part of the states outside, part outside beyond the scatter, largest excess."""
+def _estimates(limits: Limits, slopes: Slopes, level: float) -> dict[str, Estimate]:
+    value = _with_critical(limits.value[None], slopes)[0]
+    draws = _with_critical(limits.draws, slopes)
+    return {name: interval(value[k], draws[:, k], level) for k, name in enumerate(_NAMES)}
+
+
+def _between_seeds(
+    paths: Sequence[StatePath],
+    slopes: Slopes,
+    method: Method,
+    settings: Bootstrap,
+    seeds: Sequence[Hashable] | None,
+) -> dict[str, Estimate] | None:
+    """Fit each seed's paths alone; only the values are used, so few samples are drawn."""
+    few = replace(settings, samples=20)
+
+    def alone(rows: list[int]) -> Array:
+        part = _METHODS[method]([paths[k] for k in rows], slopes, few, None)
+        return _with_critical(part.value[None], slopes)[0]
+
+    return between_seeds(seeds, alone, _NAMES, settings.level)
+
+
+def _outside(paths: Sequence[StatePath], slopes: Slopes, limits: Array) -> dict[str, Any]:
+    """How many states lie outside, how many beyond the plateau's scatter, and how far."""
     extremes = [path_extremes(path.z, path.a, slopes) for path in paths]
     plateaus = [rows[path.plateau] for rows, path in zip(extremes, paths, strict=True)]
     scatter = np.sqrt(np.mean([rows.var(axis=0) for rows in plateaus], axis=0))
     rows = np.concatenate(extremes)
     beyond = np.column_stack([limits[0] - rows[:, 0], rows[:, 1] - limits[1]])
-    outside = (beyond > 1e-12 * limits[1]).any(axis=1)
-    significant = (beyond > 2.0 * scatter + 1e-12 * limits[1]).any(axis=1)
-    worst = max(float(beyond.max()), 0.0)
-    return float(outside.mean()), float(significant.mean()), worst
+    rounding = 1e-12 * limits[1]
+    return {
+        "outside_fraction": float((beyond > rounding).any(axis=1).mean()),
+        "outside_significant": float((beyond > 2.0 * scatter + rounding).any(axis=1).mean()),
+        "outside_worst": max(float(beyond.max()), 0.0),
+    }

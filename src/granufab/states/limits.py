@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import norm
 
 from granufab.errors import MissingData
-from granufab.packing import Array
+from granufab.packing import Array, IntArray
 from granufab.states.bootstrap import (
     Bootstrap,
     block_length,
@@ -146,45 +146,51 @@ def envelope_limits(
     time, length = memory_of(plateau_table(paths), settings)
     start = critical_limits(paths, slopes, Bootstrap(samples=20), None).value
     entries = _entries(paths, slopes, start, length, time)
-    rows = [np.column_stack([path.z, path.z * path.a]) for path in paths]
-    plateaus = [both[path.plateau] for both, path in zip(rows, paths, strict=True)]
-    after = [both[entry:] for both, entry in zip(rows, entries, strict=True)]
-    windows = [_window(length, time, len(part)) for part in after]
-    curves = [_smooth_columns(part, window) for part, window in zip(after, windows, strict=True)]
-    noise = [part - part.mean(axis=0) for part in plateaus]
-
-    def estimate(paths_: Sequence[int], states: Sequence[Array], noises: Sequence[Array]) -> Array:
-        smoothed = [
-            _smooth_columns(part, windows[k]) for k, part in zip(paths_, states, strict=True)
+    traces = []
+    for path, entry in zip(paths, entries, strict=True):
+        rows = np.column_stack([path.z, path.z * path.a])
+        window = _window(length, time, path.count - entry)
+        traces.append(_Trace(states=rows[entry:], plateau=rows[path.plateau], window=window))
+    value = _noise_free_extremes(traces, slopes)
+    counts = [len(trace.plateau) for trace in traces]
+    sizes = [len(trace.states) for trace in traces]
+    draws = np.array(
+        [
+            _noise_free_extremes([traces[k].redrawn(rows) for k, rows in draw], slopes)
+            for draw in resamples(counts, length, settings, seeds, sizes)
         ]
-        quantiles = _quantiles([_extremes(part, slopes) for part in smoothed])
-        scatter = [
-            _scatter(part, plateaus[k].mean(axis=0), windows[k], slopes)
-            for k, part in zip(paths_, noises, strict=True)
-        ]
-        return quantiles + np.mean(scatter, axis=0) * float(norm.ppf(_QUANTILE)) * [1.0, -1.0]
-
-    counts = [len(part) for part in plateaus]
-    sizes = [len(part) for part in after]
-    draws = []
-    for draw in resamples(counts, length, settings, seeds, sizes):
-        chosen = [k for k, _ in draw]
-        drawn = [noise[k][row] for k, row in draw]
-        states = [curves[k] + part for k, part in zip(chosen, drawn, strict=True)]
-        draws.append(
-            estimate(
-                chosen, states, [part[: counts[k]] for k, part in zip(chosen, drawn, strict=True)]
-            )
-        )
-    value = estimate(range(len(paths)), after, noise)
-    deviation = np.array(draws) - np.mean(draws, axis=0)
-    deviation *= widening(time, length, counts, settings.level)
+    )
+    deviation = (draws - draws.mean(axis=0)) * widening(time, length, counts, settings.level)
     return Limits(value=value, draws=value + deviation, block_length=length)
 
 
-def _scatter(noise: Array, mean: Array, window: int, slopes: Slopes) -> Array:
-    """Standard deviation of the smoothed extremes of a plateau."""
-    return _extremes(mean + _smooth_columns(noise, window), slopes).std(axis=0)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Trace:
+    """States (z, a z) of one path after its entry, and those of its plateau."""
+
+    states: Array
+    plateau: Array
+    window: int
+
+    def redrawn(self, rows: IntArray) -> _Trace:
+        """The smoothed states with plateau fluctuations of the drawn ``rows`` laid on them."""
+        mean = self.plateau.mean(axis=0)
+        noise = self.plateau[rows] - mean
+        return _Trace(
+            states=_smooth_columns(self.states, self.window) + noise,
+            plateau=mean + noise[: len(self.plateau)],
+            window=self.window,
+        )
+
+
+def _noise_free_extremes(traces: Sequence[_Trace], slopes: Slopes) -> Array:
+    """Quantiles of the smoothed extremes, less those of the smoothed plateau's scatter."""
+    smoothed = [_smoothed_extremes(trace.states, trace.window, slopes) for trace in traces]
+    scatter = [
+        _smoothed_extremes(trace.plateau, trace.window, slopes).std(axis=0) for trace in traces
+    ]
+    inwards = float(norm.ppf(_QUANTILE)) * np.array([1.0, -1.0])
+    return _quantiles(smoothed) + np.mean(scatter, axis=0) * inwards
 
 
 def _entries(
@@ -193,8 +199,8 @@ def _entries(
     smoothed = []
     for path in paths:
         window = _window(length, time, path.count)
-        both = _smooth_columns(np.column_stack([path.z, path.z * path.a]), window)
-        smoothed.append(_extremes(both, slopes))
+        rows = np.column_stack([path.z, path.z * path.a])
+        smoothed.append(_smoothed_extremes(rows, window, slopes))
     plateaus = [rows[path.plateau] for rows, path in zip(smoothed, paths, strict=True)]
     noise = np.sqrt(np.mean([rows.var(axis=0) for rows in plateaus], axis=0))
     limits = start + 2.0 * noise * np.array([-1.0, 1.0])
@@ -221,8 +227,9 @@ def _quantiles(extremes: Sequence[Array]) -> Array:
     return np.array([np.quantile(rows[:, 0], 1.0 - _QUANTILE), np.quantile(rows[:, 1], _QUANTILE)])
 
 
-def _extremes(rows: Array, slopes: Slopes) -> Array:
-    return path_extremes(rows[:, 0], rows[:, 1] / rows[:, 0], slopes)
+def _smoothed_extremes(rows: Array, window: int, slopes: Slopes) -> Array:
+    smoothed = _smooth_columns(rows, window)
+    return path_extremes(smoothed[:, 0], smoothed[:, 1] / smoothed[:, 0], slopes)
 
 
 def _smooth_columns(rows: Array, window: int) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,7 +54,7 @@ def as_series(values: Any, name: str) -> list[Array]:
     Raises:
         InvalidSettings: not numeric, not 1-D, empty or not finite.
     """
-    several = len(values) > 0 and np.ndim(values[0]) > 0 if np.ndim(values[:1]) else False
+    several = isinstance(values, Iterable) and np.ndim(next(iter(values), 0)) > 0
     parts: list[Array] = []
     for number, part in enumerate(values if several else [values]):
         where = f"{name} of path {number}" if several else name
