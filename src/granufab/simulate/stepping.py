@@ -139,6 +139,8 @@ class Simulation:
         self.scales = Scales.of(packing, pressure)
         self.radius = grains.radius.copy()
         self.mass = require(grains.mass, "grain masses").copy()
+        ball = np.pi * self.radius**2 if self.dimension == 2 else 4 / 3 * np.pi * self.radius**3
+        self.solid_volume = float(ball.sum())
         self.position = grains.position.copy()
         self.number = grains.number
         self.matrix, self.origin = cell.matrix.copy(), cell.origin.copy()
@@ -209,6 +211,20 @@ class Simulation:
         rate = abs(loading.deviatoric_rate)
         return min(step, self.solver.step_strain / rate) if rate > 0 else step
 
+    def step_size_limit(self, strain: float, rate: float) -> None:
+        """Shorten the step so that a whole number of them makes ``strain`` at ``rate``."""
+        steps = max(1, int(np.ceil(strain / (rate * self.step_size) - 1e-9)))
+        self.set_loading(self.loading, step=strain / rate / steps)
+
+    def stress_error(self) -> float:
+        """Worst |σ − σ_ext| / p on the stress-driven components at the last solve [-]."""
+        difference = self.stress - self.loading.stress
+        if self.loading.dilation:
+            return abs(float(np.trace(difference))) / self.dimension / self.scales.pressure
+        if self.coupled:
+            return float(np.abs(difference[self.loading.free]).max()) / self.scales.pressure
+        return 0.0
+
     def remove_drift(self) -> None:
         """Take the centre of mass's velocity out of a fully periodic system."""
         if self.periodic.all():
@@ -238,6 +254,7 @@ class Simulation:
         clock = self._tick("solve", clock)
         self._finish(rate_before)
         self._check(report)
+        self.last_report = report
         self._tick("rest", clock)
         return report
 

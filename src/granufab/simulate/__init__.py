@@ -1,0 +1,33 @@
+"""Contact Dynamics of disks and spheres: samples, loading, stepping, runs."""
+
+from granufab.simulate.loading import Biaxial, ConstantMean, Isotropic, Loading, SimpleShear
+from granufab.simulate.preparation import Prepared, compress, prepare
+from granufab.simulate.paths import Step, run, run_case, shear
+from granufab.simulate.sample import draw_radii, random_sample
+from granufab.simulate.settings import Case, Material, Record, Sample, Sizes, Solver, Stage
+from granufab.simulate.stepping import Simulation
+
+__all__ = [
+    "Biaxial",
+    "Case",
+    "ConstantMean",
+    "Isotropic",
+    "Loading",
+    "Material",
+    "Prepared",
+    "Record",
+    "Sample",
+    "Simulation",
+    "SimpleShear",
+    "Sizes",
+    "Solver",
+    "Stage",
+    "Step",
+    "compress",
+    "draw_radii",
+    "prepare",
+    "random_sample",
+    "run",
+    "run_case",
+    "shear",
+]
