@@ -41,14 +41,21 @@ def fit(
 
     paths = [path for file in series for path in read_paths(file)]
     found, definition = fit_series(paths, method, z_definition)
-    entry = fit_entry(found) | {"z_definition": definition, "series": [str(s) for s in series]}
+    entry = fit_entry(found) | {
+        "outside_significant": found.outside_significant,
+        "z_definition": definition,
+        "series": [str(file) for file in series],
+    }
     if json:
         print_json(entry)
         return
     names = ("z_min", "z_max", "z_star", "a_star")
     rows = [[name, *(entry[name][part] for part in ("value", "low", "high"))] for name in names]
     print_rows(f"fit: {method}; z: {definition}", ("", "value", "low", "high"), rows)
-    print(f"{found.outside_fraction:.1%} of the states lie outside the fitted domain")
+    print(
+        f"outside the fitted domain: {found.outside_fraction:.1%} of the states, "
+        f"{found.outside_significant:.1%} by more than their scatter"
+    )
 
 
 def fit_series(

@@ -21,16 +21,17 @@ __all__ = ["measure"]
 Definition = Literal["z", "z_backbone", "z_mechanical"]
 COUNTS = ("contact_count", "grain_count", "dimension", "stage")
 SHOWN = (
+    "frame",
     "eps_q",
     "z",
     "z_backbone",
     "rattler_fraction",
     "a",
     "a_signed",
-    "theta_c",
     "q_over_p",
     "phi",
 )
+HEADER = ("frame", "ε_q", "z", "z_backbone", "rattlers", "a", "a'", "q/p", "φ")
 
 
 def measure(
@@ -57,13 +58,12 @@ def measure(
     tables = [_measure_file(file, criterion, z_definition, frame) for file in files]
     if out is not None:
         _write(tables, out)
-    states = [state for table in tables for state in _states(table)]
     if json:
-        print_json(states)
+        print_json([state for table in tables for state in _states(table)])
         return
-    title = f"contacts: {criterion}; fabric of: {z_definition}"
-    shown = [[state["source"], state["frame"], *map(state.get, SHOWN)] for state in states]
-    print_rows(title, ("source", "frame", *SHOWN), shown)
+    for file, table in zip(files, tables, strict=True):
+        rows = [[state[name] for name in SHOWN] for state in _states(table)]
+        print_rows(f"{file}; contacts: {criterion}; fabric of: {z_definition}", HEADER, rows)
 
 
 def _measure_file(file: Path, criterion: str, z_definition: Any, frame: int | None) -> xr.Dataset:

@@ -12,6 +12,8 @@ from rich.table import Table
 
 __all__ = ["print_json", "print_pairs", "print_rows"]
 
+WIDTH_OFF_A_TERMINAL = 140
+
 
 def print_json(value: Any) -> None:
     """Print strict JSON on standard output; unknown values are null."""
@@ -41,7 +43,8 @@ def print_rows(title: str, header: Sequence[str], rows: Iterable[Sequence[Any]])
 
 
 def _console() -> Console:
-    return Console(highlight=False, markup=False)
+    width = None if sys.stdout.isatty() else WIDTH_OFF_A_TERMINAL
+    return Console(highlight=False, markup=False, width=width)
 
 
 def _text(value: Any) -> str:

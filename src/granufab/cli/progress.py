@@ -10,6 +10,7 @@ from contextlib import contextmanager
 __all__ = ["show_progress"]
 
 SECONDS_BETWEEN_LINES = 5.0
+ENOUGH_TO_TELL = 0.02  # fraction of the work after which the time left is worth a guess
 
 
 @contextmanager
@@ -67,7 +68,7 @@ def _lines() -> Callable[[str, float], None]:
             return
         printed = now
         left = ""
-        if fraction > first:
+        if fraction - first > ENOUGH_TO_TELL:
             seconds = (now - began) * (1.0 - fraction) / (fraction - first)
             left = f", about {seconds:.0f} s left"
         print(f"{text}: {100 * fraction:.0f} %{left}", file=sys.stderr, flush=True)
