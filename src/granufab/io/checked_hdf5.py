@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile, GranufabError, MissingData, UnknownFormat
 from granufab.io.schema import FORMAT_NAME, SCHEMA_VERSION, Entry, named
+from granufab.io.unclosed_hdf5 import SUPERBLOCK_BYTES, UnclosedFile, is_unclosed
 
 __all__ = ["HDF5_SIGNATURE", "CheckedFile", "is_run_file", "opened"]
 
@@ -43,8 +44,7 @@ def is_run_file(path: Path, head: bytes) -> bool:
     if not head.startswith(HDF5_SIGNATURE):
         return False
     try:
-        file, _ = _open(path)
-        with file:
+        with _open(path) as (file, _):
             return file.attrs.get("format") == FORMAT_NAME
     except _BROKEN:
         return True
@@ -62,9 +62,8 @@ def opened(path: Path) -> Iterator[CheckedFile]:
     if not path.is_file():
         raise MissingData(f"{path}: " + ("is a folder" if path.is_dir() else "no such file"))
     try:
-        file, unfinished = _open(path)
-        with file:
-            yield CheckedFile(file, path, unfinished)
+        with _open(path) as (file, unclosed):
+            yield CheckedFile(file, path, unclosed)
     except GranufabError:
         raise
     except _BROKEN as error:
@@ -72,21 +71,25 @@ def opened(path: Path) -> Iterator[CheckedFile]:
         raise CorruptFile(f"{path}: cannot be read as a run file ({reason})") from None
 
 
-def _open(path: Path) -> tuple[h5py.File, bool]:
+@contextmanager
+def _open(path: Path) -> Iterator[tuple[h5py.File, bool]]:
+    """An HDF5 file, and whether its writer has not closed it."""
     with path.open("rb") as stream:
-        if stream.read(len(HDF5_SIGNATURE)) != HDF5_SIGNATURE:
-            raise UnknownFormat(f"{path}: is not an HDF5 file, so not a granufab run file")
-    try:
-        return h5py.File(path, "r", locking=False), False
-    except OSError:
-        pass
-    try:
-        return h5py.File(path, "r", locking=False, swmr=True), True
-    except OSError:
-        raise CorruptFile(
-            f"{path}: cannot be opened; it is truncated, or its writer was stopped before the "
-            "first frame"
-        ) from None
+        head = stream.read(SUPERBLOCK_BYTES)
+    if not head.startswith(HDF5_SIGNATURE):
+        raise UnknownFormat(f"{path}: is not an HDF5 file, so not a granufab run file")
+    unclosed = is_unclosed(head)
+    with ExitStack() as stack:
+        try:
+            if unclosed:
+                stream = stack.enter_context(UnclosedFile(path))
+                file = stack.enter_context(h5py.File(stream, "r"))
+            else:
+                file = stack.enter_context(h5py.File(path, "r", locking="best-effort"))
+        except OSError as error:
+            reason = str(error).splitlines()[0]
+            raise CorruptFile(f"{path}: is truncated or damaged ({reason})") from None
+        yield file, unclosed
 
 
 class CheckedFile:
@@ -95,10 +98,10 @@ class CheckedFile:
     Args:
         file: the open file.
         path: for messages.
-        unfinished: whether its writer has not closed it.
+        unclosed: whether its writer has not closed it.
     """
 
-    def __init__(self, file: h5py.File, path: Path, unfinished: bool) -> None:
+    def __init__(self, file: h5py.File, path: Path, unclosed: bool) -> None:
         self._file = file
         self.path = path
         if file.attrs.get("format") != FORMAT_NAME:
@@ -112,7 +115,7 @@ class CheckedFile:
         self.dimension = self.whole("dimension")
         self.grain_count = self.whole("grain_count")
         size = path.stat().st_size
-        if unfinished and size < self.counter("file_bytes"):
+        if unclosed and size < self.counter("file_bytes"):
             raise self.corrupt(
                 f"is truncated: {size} bytes of {self.counter('file_bytes')}; copy it again"
             )
