@@ -220,3 +220,16 @@ def test_bad_input_is_one_clear_line(change: dict[str, Any], says: str) -> None:
         fit_accessible_states(**arguments)
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_blocks_follow_the_memory_unless_they_are_given(method: Any) -> None:
+    random = np.random.default_rng(22)
+    short = fit_accessible_states(*relaxing(3.3, random, memory=0.0), method=method)
+    long = fit_accessible_states(*relaxing(3.3, random, memory=0.85), method=method)
+    assert short.block_length <= 4 < 10 <= long.block_length
+    given = Bootstrap(samples=50, block_length=7)
+    assert (
+        fit_accessible_states(*relaxing(3.3, random), method=method, bootstrap=given).block_length
+        == 7
+    )
