@@ -11,12 +11,14 @@ import numpy as np
 from granufab.errors import NotConverged
 from granufab.history import Frame, Run, StepStatistics, series_dataset
 from granufab.packing import Cell, Contacts, Grains, Packing
-from granufab.simulate.settings import Case
+from granufab.simulate.settings import Case, Sample
 
 Z_STAR, A_STAR = 3.35, 0.24
 
 
-def synthetic_run(case: Case, *, record: Any = None, progress: Any = None) -> Run:
+def synthetic_run(
+    case: Case, *, record: Any = None, progress: Any = None, start: Any = None
+) -> Run:
     """z and a' relax to (3.35, 0.24), shifted for other frictions; noise as of N grains."""
     rows = _rows(case)
     if record is not None:
@@ -35,10 +37,22 @@ def synthetic_run(case: Case, *, record: Any = None, progress: Any = None) -> Ru
     )
 
 
+def synthetic_sample(sample: Sample, *, progress: Any = None) -> str:
+    """Stands for a sample; the synthetic run does not look at it."""
+    return f"sample of {sample.grain_count} grains"
+
+
+def reluctant_run(case: Case, *, record: Any = None, progress: Any = None) -> Run:
+    """Refuses z_0 below 3.5, as the preparation of a sample does, but takes any friction."""
+    if case.sample.coordination is not None and case.sample.coordination < 3.5:
+        raise NotConverged("sample.coordination = 3.1 (z_backbone) cannot be reached")
+    return synthetic_run(case, record=record, progress=progress)
+
+
 def failing_run(case: Case, *, record: Any = None, progress: Any = None) -> Run:
-    """Fails for the loose path only, as an unreachable coordination would."""
+    """Fails for the loose path only, as a strict solver would."""
     if case.name == "loose":
-        raise NotConverged("coordination 3.1 cannot be reached; reachable 3.2..4.0")
+        raise NotConverged("step 12 ended with residual 0.1")
     return synthetic_run(case, record=record, progress=progress)
 
 

@@ -15,7 +15,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from synthetic_run import A_STAR, Z_STAR, failing_run, synthetic_run
+from synthetic_run import (
+    A_STAR,
+    Z_STAR,
+    failing_run,
+    reluctant_run,
+    synthetic_run,
+    synthetic_sample,
+)
 
 from granufab.errors import GranufabError, InvalidSettings, NotConverged
 from granufab.history import SERIES_UNITS
@@ -37,7 +44,8 @@ SOLVER_KEYS = {
 
 
 def _reproduce(figure: str, out: Path, **options: Any) -> dict[str, Any]:
-    return reproduce(figure, out=out, run_case=synthetic_run, workers=1, **options)
+    options = {"run_case": synthetic_run, "prepare": synthetic_sample, "workers": 1} | options
+    return reproduce(figure, out=out, **options)
 
 
 @pytest.fixture(scope="module")
@@ -133,10 +141,30 @@ def test_fig8_fits_each_friction(results: Any) -> None:
     assert chosen["z_star"] == fits[2]["z_star"]
 
 
-def test_fig8_shears_one_sample(results: Any) -> None:
-    cases = results["fig8"][1]["settings"]["cases"].values()
-    samples = [case["sample"] for case in cases]
-    assert all(sample == samples[0] for sample in samples)
+def test_fig8_shears_one_sample(tmp_path: Path) -> None:
+    made: list[Any] = []
+    starts: list[Any] = []
+
+    def prepare(sample: Sample, *, progress: Any) -> object:
+        made.append(object())
+        return made[-1]
+
+    def run(case: Case, *, record: Any, progress: Any, start: Any) -> Any:
+        starts.append(start)
+        return synthetic_run(case, record=record, progress=progress)
+
+    _reproduce("fig8", tmp_path / "out", grains=50, run_case=run, prepare=prepare)
+    assert len(made) == 1
+    assert starts == made * 5
+
+
+def test_an_unreachable_start_becomes_the_nearest_one_and_is_said(tmp_path: Path) -> None:
+    result = _reproduce("fig7", tmp_path / "out", grains=50, run_case=reluctant_run)
+    loose = result["paths"][1]
+    assert loose["z_0_wanted"] == 3.1
+    assert loose["z_0"] == 3.5
+    assert "wanted z_0 = 3.1, the nearest reachable is 3.50" in loose["warnings"]
+    assert result["paths"][0]["warnings"] == []
 
 
 def test_quick_changes_the_size_and_not_the_tolerance(
@@ -171,7 +199,7 @@ def test_seeds_repeat_every_path_independently_and_in_worker_processes(tmp_path:
 def test_a_failed_path_is_named_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(NotConverged) as caught:
         reproduce("fig7", out=tmp_path / "out", run_case=failing_run, workers=2)
-    assert str(caught.value).startswith("path loose: coordination 3.1 cannot be reached")
+    assert str(caught.value).startswith("path loose: step 12 ended")
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "out" / "fig7.json").exists()
 

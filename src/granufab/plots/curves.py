@@ -74,7 +74,11 @@ def _single(results: object) -> bool:
 
 
 def _name(item: Any) -> str:
-    return item.name if isinstance(item, Run) else str(item.attrs.get("path", ""))
+    return (
+        item.name
+        if isinstance(item, Run)
+        else str(item.attrs.get("name") or item.attrs.get("path", ""))
+    )
 
 
 def _datasets(value: Any, *, keep_runs: bool = False) -> list[Any]:

@@ -22,7 +22,7 @@ Progress = Callable[[str, float], None]
 """Called with what is being done and the fraction that is done, 0..1."""
 
 RunCase = Callable[..., Run]
-"""``run_case(case, *, record, progress) -> Run``."""
+"""``run_case(case, *, record, progress, start=…) -> Run``."""
 
 
 def run_into_folder(
@@ -30,6 +30,7 @@ def run_into_folder(
     folder: Path | str,
     *,
     force: bool = False,
+    start: Any = None,
     progress: Progress | None = None,
     run_case: RunCase | None = None,
 ) -> Run:
@@ -41,6 +42,7 @@ def run_into_folder(
         case: what to simulate.
         folder: made if missing; an earlier run in it is replaced only with ``force``.
         force: replace the four files where they exist.
+        start: a sample made before (:func:`granufab.prepare`), instead of preparing one.
         progress: called a few times a second.
         run_case: what simulates; :func:`granufab.simulate.run_case` by default.
     Returns:
@@ -58,12 +60,13 @@ def run_into_folder(
         )
     check_writable(folder)
     simulate = run_case or _simulator()
+    given = {} if start is None else {"start": start}
     for name in held:
         (folder / name).unlink()
     write_text(to_toml(case), folder / "settings.toml")
     settings = case.model_dump(mode="json")
     with RunFileWriter(folder / "run.h5", settings=settings, force=True) as recorder:
-        run = simulate(case, record=recorder, progress=progress)
+        run = simulate(case, record=recorder, progress=progress, **given)
         recorder.close(None if run.summary.get("interrupted") else run.summary)
     write_series(run.series, folder / "series.csv", case.name)
     write_json(_summary(case, run), folder / "summary.json")

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -12,18 +13,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from granufab.errors import InvalidSettings
+from granufab.errors import InvalidSettings, NotConverged
 from granufab.history import Run
 from granufab.io import json_text, write_json, write_series
 from granufab.reproduce.case_folder import Progress, RunCase, read_run
 from granufab.reproduce.out_folder import prepare_out_folder
 from granufab.reproduce.report import fit_all, report
-from granufab.reproduce.workers import Job, run_jobs
+from granufab.reproduce.workers import Job, nearest_sample, run_jobs
 
 __all__ = ["FIGURES", "QUICK_GRAINS", "reproduce"]
 
 FIGURES = ("fig5", "fig6", "fig7", "fig8")
 QUICK_GRAINS = 1000
+SAMPLE_SHARE = 0.2  # of the progress, where the sample is made first
 
 
 def reproduce(
@@ -38,6 +40,7 @@ def reproduce(
     workers: int | None = None,
     progress: Progress | None = None,
     run_case: RunCase | None = None,
+    prepare: Callable[..., Any] | None = None,
 ) -> dict[str, Any]:
     """Simulate and draw one of the paper's figures [Radjai2012, Figs 5–8].
 
@@ -55,6 +58,7 @@ def reproduce(
         workers: processes at a time; by default one per core, at most one per run.
         progress: called with a line of text and the fraction done.
         run_case: what simulates a case; :func:`granufab.simulate.run_case` by default.
+        prepare: what makes a sample that paths share; :func:`granufab.prepare` by default.
     Returns:
         The content of ``figN.json``.
     Raises:
@@ -69,6 +73,9 @@ def reproduce(
 
     jobs = _jobs(recipe, folder, grain_count, _seeds(seed, seeds))
     every = [job for repeats in jobs.values() for job in repeats]
+    if recipe.one_sample:
+        every = _with_samples(every, prepare, _part(progress, 0.0, SAMPLE_SHARE))
+        progress = _part(progress, SAMPLE_SHARE, 1.0)
     run_jobs(every, workers=workers, progress=progress, run_case=run_case)
     runs = {name: [read_run(job.folder) for job in repeats] for name, repeats in jobs.items()}
 
@@ -109,6 +116,38 @@ def _jobs(recipe: Any, folder: Path, grain_count: int, seeds: list[int]) -> dict
             job = Job(case=case, folder=folder / "runs" / name)
             jobs.setdefault(path.name, []).append(job)
     return jobs
+
+
+def _with_samples(
+    jobs: list[Job], prepare: Callable[..., Any] | None, progress: Progress
+) -> list[Job]:
+    """The jobs with their starting samples; jobs of the same sample settings share one."""
+    if prepare is None:
+        from granufab.simulate import prepare as prepare_sample
+
+        prepare = prepare_sample
+    wanted = list(dict.fromkeys(job.case.sample for job in jobs))
+    made = {}
+    for index, sample in enumerate(wanted):
+        tell = _part(progress, index / len(wanted), (index + 1) / len(wanted))
+        try:
+            made[sample] = prepare(sample, progress=tell)
+        except NotConverged as error:
+            nearest = nearest_sample(sample, error)
+            if nearest is None:
+                raise
+            made[sample] = prepare(nearest, progress=tell)
+    return [replace(job, start=made[job.case.sample]) for job in jobs]
+
+
+def _part(progress: Progress | None, low: float, high: float) -> Progress:
+    """Progress over a part of the whole."""
+
+    def tell(text: str, share: float) -> None:
+        if progress is not None:
+            progress(text, low + (high - low) * min(max(share, 0.0), 1.0))
+
+    return tell
 
 
 def _leave(

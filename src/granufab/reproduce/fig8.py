@@ -1,6 +1,6 @@
 """Figure 8: one sample sheared with five friction coefficients, in the (z, az) plane.
 
-All five paths start from the same sample: the same seed and the same wanted z_0. Each has its
+All five paths start from the same sample, made once. Each has its
 own accessible domain; the file's ``fit`` is that of µ = 0.5, ``fits`` holds all.
 """
 
@@ -46,5 +46,6 @@ RECIPE = Recipe(
     grain_count=13_000,
     draw=_draw,
     extra=_extra,
+    one_sample=True,
     fit_from="mu0.5",
 )

@@ -15,7 +15,7 @@ from granufab.packing import Array
 from granufab.simulate.settings import Case, Material, Sample, Stage
 from granufab.states import AccessibleFit
 
-__all__ = ["Outcome", "PathRecipe", "Recipe", "column", "first_stage", "last_stage"]
+__all__ = ["Outcome", "PathRecipe", "Recipe", "column", "first_stage", "last_stage", "reached_z"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,9 +71,7 @@ class Outcome:
         """Text of the legend of each path, with the z_0 that was reached."""
         labels = {}
         for path in self.recipe.paths:
-            z_0 = np.mean(
-                [column(run.series, self.z_definition)[0] for run in self.runs[path.name]]
-            )
+            z_0 = np.mean([reached_z(run, self.z_definition) for run in self.runs[path.name]])
             labels[path.name] = path.label.replace("{z_0}", f"{z_0:.2f}")
         return labels
 
@@ -93,6 +91,7 @@ class Recipe:
         grain_count: grains per sample at full size.
         draw: makes the figure.
         extra: further entries of the figure's JSON file.
+        one_sample: every path starts from the same sample, made once.
         fit_from: name of the path whose states alone define the domain; None takes all paths.
     """
 
@@ -101,6 +100,7 @@ class Recipe:
     draw: Callable[[Outcome], Figure]
     grain_count: int = 5000
     extra: Callable[[Outcome], dict[str, Any]] = field(default=lambda outcome: {})
+    one_sample: bool = False
     fit_from: str | None = None
 
 
@@ -128,3 +128,10 @@ def _turn(series: xr.Dataset) -> int | None:
 def column(series: xr.Dataset, name: str) -> Array:
     """One column of a series as numbers."""
     return np.asarray(series[name].values, dtype=float)
+
+
+def reached_z(run: Run, z_definition: str) -> float:
+    """z_0 of the isotropic sample at rest, or of the first record where that is not known."""
+    sample = run.summary.get("sample") or {}
+    value = sample.get(z_definition)
+    return float(column(run.series, z_definition)[0] if value is None else value)

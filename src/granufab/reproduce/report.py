@@ -10,12 +10,15 @@ import numpy as np
 import granufab
 from granufab.errors import GranufabError
 from granufab.history import Run
-from granufab.reproduce.recipe import Outcome, PathRecipe, Recipe, column, first_stage
+from granufab.reproduce.recipe import Outcome, PathRecipe, Recipe, column, first_stage, reached_z
 from granufab.simulate.settings import Case
 from granufab.states import AccessibleFit, CriticalState, Estimate, critical_state
 from granufab.states import fit_accessible_states as fit_states
 
 __all__ = ["METHODS", "estimate", "fit_all", "fit_entry", "fit_runs", "report"]
+
+Z_TOLERANCE = 0.05
+"""A start further than this from the wanted z_0 is said to be the nearest reachable."""
 
 METHODS = ("critical", "envelope", "lines")
 """The fits that every figure reports; the first is the default."""
@@ -138,7 +141,7 @@ def _path_entry(outcome: Outcome, path: PathRecipe) -> dict[str, Any]:
     runs = outcome.runs[path.name]
     known = [name for name in ("q_over_p", "phi", "rattler_fraction") if _complete(runs, name)]
     state = critical_means(runs, outcome.z_definition, known)
-    reached = [_reached(run, outcome.z_definition) for run in runs]
+    reached = [reached_z(run, outcome.z_definition) for run in runs]
     summaries = [run.summary for run in runs]
     return {
         "name": path.name,
@@ -155,17 +158,20 @@ def _path_entry(outcome: Outcome, path: PathRecipe) -> dict[str, Any]:
         "strain_averaged": [list(window) for window in state.plateau],
         "grain_count": summaries[0].get("grain_count"),
         "seeds": [item.get("seed") for item in summaries],
-        "warnings": sorted({text for item in summaries for text in item.get("warnings", [])}),
+        "warnings": _warnings(path, reached, summaries),
     }
+
+
+def _warnings(path: PathRecipe, reached: Sequence[float], summaries: Sequence[Any]) -> list[str]:
+    texts = {text for item in summaries for text in item.get("warnings", [])}
+    for value in reached:
+        if abs(value - path.coordination) > Z_TOLERANCE:
+            texts.add(f"wanted z_0 = {path.coordination:g}, the nearest reachable is {value:.2f}")
+    return sorted(texts)
 
 
 def _complete(runs: Sequence[Run], name: str) -> bool:
     return all(name in run.series and np.isfinite(run.series[name]).all() for run in runs)
-
-
-def _reached(run: Run, z_definition: str) -> float:
-    value = run.summary.get("z_0")
-    return float(column(run.series, z_definition)[0] if value is None else value)
 
 
 def _settings(cases: Sequence[Case]) -> dict[str, Any]:

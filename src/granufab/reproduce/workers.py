@@ -15,21 +15,24 @@ from multiprocessing.managers import SyncManager
 from pathlib import Path
 from typing import Any
 
-from granufab.errors import GranufabError
+from granufab.errors import GranufabError, NotConverged
+from granufab.history import Run
 from granufab.reproduce.case_folder import Progress, RunCase, run_into_folder
-from granufab.simulate.settings import Case
+from granufab.simulate.settings import Case, Sample
 
-__all__ = ["Job", "run_jobs"]
+__all__ = ["Job", "nearest_sample", "run_jobs"]
 
 PATIENCE = 10.0  # seconds that a worker is given to stop by itself
+LARGEST_FRICTION = 5.0  # of a compaction; z_0 hardly falls beyond it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """A case and the folder it is run into."""
+    """A case, the folder it is run into, and the sample it starts from if that is made already."""
 
     case: Case
     folder: Path
+    start: Any = None
 
 
 def run_jobs(
@@ -89,15 +92,42 @@ class _Board:
 def _run_one(job: Job, progress: Progress | None, run_case: RunCase | None) -> None:
     name = job.case.name
     try:
-        run = run_into_folder(
-            job.case, job.folder, force=True, progress=progress, run_case=run_case
-        )
+        run = _run_or_nearest(job, progress, run_case)
     except GranufabError as error:
         raise type(error)(f"path {name}: {error}") from None
     except Exception as error:
         raise GranufabError(f"path {name}: {type(error).__name__}: {error}") from error
     if run.summary.get("interrupted"):
         raise KeyboardInterrupt
+
+
+def _run_or_nearest(job: Job, progress: Progress | None, run_case: RunCase | None) -> Run:
+    """Run the case; where its z_0 is out of reach, start from the nearest sample that is not."""
+
+    def run(case: Case) -> Run:
+        return run_into_folder(
+            case, job.folder, force=True, start=job.start, progress=progress, run_case=run_case
+        )
+
+    try:
+        return run(job.case)
+    except NotConverged as error:
+        nearest = nearest_sample(job.case.sample, error)
+        if nearest is None:
+            raise
+    return run(job.case.model_copy(update={"sample": nearest}))
+
+
+def nearest_sample(sample: Sample, error: NotConverged) -> Sample | None:
+    """The extreme sample on the wanted side, if ``error`` says that z_0 is out of reach.
+
+    Compaction without friction gives the largest z_0, with friction 5 very nearly the smallest.
+    """
+    if sample.coordination is None or "sample.coordination" not in str(error):
+        return None
+    loose = sample.coordination < sample.dimension + 1.5
+    friction = LARGEST_FRICTION if loose else 0.0
+    return sample.model_copy(update={"coordination": None, "friction": friction})
 
 
 def _run_parallel(
@@ -110,9 +140,7 @@ def _run_parallel(
 ) -> None:
     messages, stop = manager.Queue(), manager.Event()
     others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_start_worker, initargs=(workers,)
-    )
+    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker)
     futures: list[Future[None]] = []
     try:
         for index, job in enumerate(jobs):
@@ -135,7 +163,9 @@ def _follow(futures: Sequence[Future[None]], messages: Any, board: _Board) -> No
                 future.result()
             except BrokenProcessPool:
                 raise GranufabError(
-                    "a worker process ended abruptly (killed, or out of memory); use fewer grains"
+                    "a worker process ended abruptly: out of memory (use fewer grains), killed, "
+                    'or started from a script without if __name__ == "__main__": (add it, or '
+                    "give workers=1)"
                 ) from None
             index = futures.index(future)
             board.post(index, "done", 1.0)
@@ -159,11 +189,9 @@ def _end(pool: ProcessPoolExecutor, futures: Sequence[Future[None]], others: set
         process.join(timeout=PATIENCE)
 
 
-def _start_worker(workers: int) -> None:
+def _start_worker() -> None:
     # The parent decides when to stop: Ctrl-C reaches the whole group of processes.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threads = max(1, (os.cpu_count() or 1) // workers)
-    os.environ.setdefault("NUMBA_NUM_THREADS", str(threads))
 
 
 class _Stopped(KeyboardInterrupt):
