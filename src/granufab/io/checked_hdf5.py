@@ -103,6 +103,7 @@ class CheckedFile:
 
     def __init__(self, file: h5py.File, path: Path, unclosed: bool) -> None:
         self._file = file
+        self._known: dict[str, h5py.Dataset] = {}
         self.path = path
         if file.attrs.get("format") != FORMAT_NAME:
             raise UnknownFormat(f"{path}: is HDF5, but not a granufab run file")
@@ -195,6 +196,8 @@ class CheckedFile:
     def _dataset(self, entry: Entry) -> h5py.Dataset:
         """The dataset of an entry, after checking link, type, shape, storage and filters."""
         name = entry.name
+        if name in self._known:
+            return self._known[name]
         parts = name.split("/")
         for depth in range(1, len(parts) + 1):
             link = self._file.get("/".join(parts[:depth]), getlink=True)
@@ -211,6 +214,7 @@ class CheckedFile:
         if shape != wanted or (not fixed and len(data.shape) != len(entry.shape)):
             raise self.corrupt(f"{name} has shape {data.shape}, expected {wanted} per record")
         self._check_storage(data, name)
+        self._known[name] = data
         return data
 
     def _check_storage(self, data: h5py.Dataset, name: str) -> None:

@@ -163,7 +163,8 @@ class _FrameReader:
         fields = self._group("contacts", "contacts")
         if fields["pair"] is None:
             return None
-        if fields["branch"] is not None and np.isnan(fields["branch"]).all():
+        branch = fields["branch"]
+        if branch is not None and branch.size and np.isnan(branch).all():
             if fields["gap"] is None:
                 raise self._file.corrupt(f"frame {self._index} has neither branch nor gap")
             if ((fields["pair"] < 0) | (fields["pair"] >= len(radius))).any():
