@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.typing import ColorType
 
 from granufab.errors import MissingData
-from granufab.plots.style import FIT, new_figure, style
+from granufab.plots.style import new_figure, style
 
 __all__ = ["rose"]
 
@@ -74,12 +74,10 @@ def _draw(ax: Axes, data: xr.Dataset, label: str, marker: str, colour: ColorType
 def _dress(ax: Axes, top: float) -> None:
     ax.grid(color="#d5d5d5", lw=0.5)
     step = next(s for s in (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10) if top / s <= 4.5)
-    ax.set_yticks(np.arange(step, 1.1 * top, step))
+    rings = np.arange(step, 1.1 * top, step)
+    ax.set_yticks(rings, labels=[""] * len(rings))
     ax.set_xticks(np.radians(np.arange(0, 360, 45)))
     ax.minorticks_off()
-    ax.tick_params(axis="y", labelcolor=FIT, labelsize=8)
-    ax.tick_params(axis="x", pad=1)
-    for label in ax.get_yticklabels():
-        label.set_bbox({"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.6})
-    ax.set_rlabel_position(68)  # pyright: ignore[reportAttributeAccessIssue]
-    ax.set_ylabel(r"$E(\theta)$ [rad$^{-1}$]", labelpad=24)
+    ax.tick_params(axis="x", pad=2)
+    # Numbers on the rings would hide points, so the label says what a ring is worth.
+    ax.set_ylabel(rf"$E(\theta)$ [rad$^{{-1}}$], rings every {step:g}", labelpad=24)

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from multiprocessing.managers import SyncManager
 from pathlib import Path
 from typing import Any
 
@@ -63,8 +62,7 @@ def run_jobs(
             board.post(index, "done", 1.0)
         return
     context = multiprocessing.get_context("spawn")
-    with context.Manager() as manager:
-        _run_parallel(jobs, workers, board, run_case, manager, context)
+    _run_parallel(jobs, workers, board, run_case, context)
 
 
 class _Board:
@@ -135,16 +133,17 @@ def _run_parallel(
     workers: int,
     board: _Board,
     run_case: RunCase | None,
-    manager: SyncManager,
     context: Any,
 ) -> None:
-    messages, stop = manager.Queue(), manager.Event()
+    messages, stop = context.Queue(), context.Event()
     others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(workers, mp_context=context, initializer=_start_worker)
+    pool = ProcessPoolExecutor(
+        workers, mp_context=context, initializer=_start_worker, initargs=(messages, stop)
+    )
     futures: list[Future[None]] = []
     try:
         for index, job in enumerate(jobs):
-            futures.append(pool.submit(_work, job, index, messages, stop, run_case))
+            futures.append(pool.submit(_work, job, index, run_case))
         _follow(futures, messages, board)
     except BaseException:
         stop.set()
@@ -189,16 +188,21 @@ def _end(pool: ProcessPoolExecutor, futures: Sequence[Future[None]], others: set
         process.join(timeout=PATIENCE)
 
 
-def _start_worker() -> None:
+_channel: dict[str, Any] = {}  # of a worker process: where it reports, and the word to stop
+
+
+def _start_worker(messages: Any, stop: Any) -> None:
     # The parent decides when to stop: Ctrl-C reaches the whole group of processes.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    messages.cancel_join_thread()
+    _channel.update(messages=messages, stop=stop)
 
 
 class _Stopped(KeyboardInterrupt):
     """The parent asked this worker to stop."""
 
 
-def _work(job: Job, index: int, messages: Any, stop: Any, run_case: RunCase | None) -> None:
+def _work(job: Job, index: int, run_case: RunCase | None) -> None:
     last = [0.0]
 
     def report(text: str, share: float) -> None:
@@ -206,9 +210,9 @@ def _work(job: Job, index: int, messages: Any, stop: Any, run_case: RunCase | No
         if now - last[0] < 0.2:
             return
         last[0] = now
-        if stop.is_set():
+        if _channel["stop"].is_set():
             raise _Stopped
-        messages.put((index, text, share))
+        _channel["messages"].put((index, text, share))
 
     report("starting", 0.0)
     try:
