@@ -202,6 +202,12 @@ def test_grains_that_change_are_refused(tmp_path: Path, name: str) -> None:
     assert len(gio.read(tmp_path / "run.h5").frames) == 2
 
 
+def test_a_name_too_long_is_refused_before_anything_is_touched(tmp_path: Path) -> None:
+    with pytest.raises(InvalidSettings, match="at most 64"):
+        RunFileWriter(tmp_path / "run.h5", settings={"name": "x" * 65})
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_rows_with_unknown_columns_or_long_names_are_refused(tmp_path: Path) -> None:
     with RunFileWriter(tmp_path / "run.h5", settings={}) as writer:
         with pytest.raises(InvalidSettings, match="temperature"):

@@ -59,7 +59,8 @@ class RunFileWriter:
         provenance: added to versions, platform and CPU, which are recorded in any case.
         force: replace an existing file.
     Raises:
-        InvalidSettings: the file exists, or cannot be written.
+        InvalidSettings: the file exists or cannot be written, or the settings' ``name`` is longer
+            than the file's schema allows.
     """
 
     def __init__(
@@ -71,6 +72,7 @@ class RunFileWriter:
         force: bool = False,
     ) -> None:
         self.path = Path(path)
+        _path_name(settings.get("name", ""))
         attributes = {
             "format": FORMAT_NAME,
             "schema_version": SCHEMA_VERSION,
@@ -133,9 +135,7 @@ class RunFileWriter:
             raise InvalidSettings(
                 f"unknown series column {min(unknown)} (known: path, {', '.join(SERIES_UNITS)})"
             )
-        name = str(row.get("path", "")).encode()
-        if len(name) > NAME_BYTES:
-            raise InvalidSettings(f"a path's name has {len(name)} bytes, at most {NAME_BYTES}")
+        name = _path_name(row.get("path", ""))
         try:
             for entry in entries("rows"):
                 column = entry.name.removeprefix("series/")
@@ -244,6 +244,13 @@ class RunFileWriter:
                     f"{where}: the grains' {name} differs from the first frame's, but a run file "
                     "keeps it once; write another file"
                 )
+
+
+def _path_name(name: object) -> bytes:
+    stored = str(name).encode()
+    if len(stored) > NAME_BYTES:
+        raise InvalidSettings(f"name has {len(stored)} bytes, allowed at most {NAME_BYTES}: {name}")
+    return stored
 
 
 def _branch_is_derived(packing: Packing) -> bool:
