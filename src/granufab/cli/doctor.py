@@ -87,13 +87,16 @@ def _compile_cache() -> dict[str, Any]:
     import granufab
 
     wanted = vars(config)["CACHE_DIR"]
-    folders = [Path(wanted)] if wanted else [Path(granufab.__file__).parent]
-    compiled = [path for folder in folders for path in folder.rglob("*.nbc")]
+    folder = Path(wanted) if wanted else Path(granufab.__file__).parent
+    compiled = list(folder.rglob("*.nbc"))
+    sources = Path(granufab.__file__).parent.glob("kernels/*.py")
+    newest = max(path.stat().st_mtime for path in sources)
     return {
-        "folder": str(folders[0]) if wanted else str(folders[0] / "*" / "__pycache__"),
+        "folder": str(folder if wanted else folder / "*" / "__pycache__"),
         "set_by": "NUMBA_CACHE_DIR" if wanted else "default",
-        "writable": os.access(_existing(folders[0]), os.W_OK),
+        "writable": os.access(_existing(folder), os.W_OK),
         "compiled": len(compiled),
+        "older_than_the_kernels": sum(path.stat().st_mtime < newest for path in compiled),
         "megabytes": sum(path.stat().st_size for path in compiled) / 1e6,
     }
 

@@ -1,0 +1,119 @@
+"""``run`` simulates a small case and leaves the promised files; a signal ends it with code 3."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from granufab.history import SERIES_UNITS
+from granufab.simulate.settings import load_case
+
+CASE = """
+name = "tiny"
+[sample]
+grain_count = 40
+[record]
+series_interval = 5e-4
+frame_interval = 0.005
+[[path]]
+strain = 0.02
+inertial_number = 5e-3
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The results of one tiny run."""
+    from granufab.cli import main
+
+    base = tmp_path_factory.mktemp("run")
+    case = base / "tiny.toml"
+    case.write_text(CASE, encoding="utf-8")
+    arguments = ["run", str(case), "--out", str(base / "out"), "--seed", "5"]
+    with pytest.raises(SystemExit) as ended:
+        main([*arguments, "--set", "material.friction=0.2"])
+    assert ended.value.code == 0
+    return base / "out"
+
+
+def test_the_promised_files_and_no_others(folder: Path) -> None:
+    names = ["run.h5", "series.csv", "settings.toml", "summary.json"]
+    assert sorted(path.name for path in folder.iterdir()) == names
+
+
+def test_the_series_has_the_promised_columns_and_reaches_the_strain(folder: Path) -> None:
+    with (folder / "series.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert list(rows[0]) == ["path", *SERIES_UNITS]
+    assert {row["path"] for row in rows} == {"tiny"}
+    assert float(rows[-1]["eps_q"]) == pytest.approx(0.02, rel=1e-6)
+    assert 2.0 < float(rows[-1]["z_backbone"]) < 4.1
+    assert float(rows[-1]["inertial_number"]) == pytest.approx(5e-3)
+
+
+def test_the_settings_are_the_resolved_ones(folder: Path) -> None:
+    case = load_case(folder / "settings.toml")
+    assert case.sample.seed == 5
+    assert case.material.friction == 0.2
+    assert case.sample.grain_count == 40
+
+
+def test_the_summary_says_how_well_it_was_solved(folder: Path) -> None:
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["seed"] == 5
+    assert summary["steps"] >= 200
+    assert summary["nonconverged_steps"] <= 0.01 * summary["steps"]
+    assert summary["overlap_max"] < 2e-3
+
+
+def test_other_verbs_read_what_run_left(granufab, folder: Path) -> None:
+    states = json.loads(granufab("measure", folder / "run.h5", "--json").out)
+    assert states[-1]["eps_q"] == pytest.approx(0.02, rel=1e-6)
+    assert states[-1]["p"] == pytest.approx(1.0, abs=0.02)
+    found = json.loads(granufab("fit", folder / "series.csv", "--json").out)
+    again = json.loads(granufab("fit", folder / "run.h5", "--json").out)
+    assert found["z_star"]["value"] == pytest.approx(again["z_star"]["value"], rel=1e-6)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_run_with_code_3(granufab, tmp_path: Path, number: signal.Signals) -> None:
+    case = tmp_path / "long.toml"
+    case.write_text(CASE.replace("strain = 0.02", "strain = 50.0"), encoding="utf-8")
+    out = tmp_path / "out"
+    program = "from granufab.cli import main; main()"
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, "run", str(case), "--out", str(out)],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        _wait_for_frames(out / "run.h5", process)
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert process.returncode == 3, errors
+    assert errors.splitlines()[-1] == "granufab: interrupted"
+    assert "Traceback" not in errors
+    assert json.loads(granufab("info", out / "run.h5", "--json").out)["frames"] >= 1
+
+
+def _wait_for_frames(path: Path, process: subprocess.Popen[str]) -> None:
+    """Until the run file has grown past its header, by several frames."""
+    for _ in range(1200):
+        assert process.poll() is None, process.communicate()
+        if path.exists() and path.stat().st_size > 150_000:
+            return
+        time.sleep(0.1)
+    raise AssertionError("no frames within two minutes")
