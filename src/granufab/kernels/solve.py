@@ -1,8 +1,8 @@
 """The nonlinear solve of one step: sweeps with safeguarded momentum until the residual is met.
 
 Momentum: x_{k+1} = sweep(y_k), y_{k+1} = x_{k+1} + β_k (x_{k+1} − x_k) with β_k = min(k/(k+3),
-cap). When the step norm ‖x_{k+1} − y_k‖ grows by more than 1.1 the momentum restarts and 1 − cap
-grows by 1.3. Velocities are affine in the impulses, so both are extrapolated alike. The residual
+cap). When the step norm ‖x_{k+1} − y_k‖ grows by more than 1.02 the momentum restarts and 1 − cap
+grows by 1.3; after 15 sweeps without a restart 1 − cap shrinks by 1.3 again. Velocities are affine in the impulses, so both are extrapolated alike. The residual
 is taken only on an unextrapolated iterate, when the step norm promises that it is met, and at
 least every ``CHECK`` sweeps.
 """
@@ -18,8 +18,9 @@ from granufab.kernels.sweep import residual, sweep
 __all__ = ["CHECK", "extrapolate", "solve"]
 
 CHECK = 40
-GROWTH = 1.1
+GROWTH = 1.02
 CAUTION = 1.3
+RECOVERY = 15
 
 
 @kernel
@@ -78,6 +79,7 @@ def solve(problem: Problem, state: State, before: State, like, settings):
     found = residual(problem, state, like, floor)
     sweeps = 0
     since_check, momentum_age, last_step = 0, 0, np.inf
+    highest, calm = cap, 0
     ratio = 1.0
     remember(state, before)
     while found[0] > tolerance and sweeps < max_sweeps:
@@ -91,10 +93,16 @@ def solve(problem: Problem, state: State, before: State, like, settings):
             ratio = max(0.2, 0.9 * found[0] / max(relative, 1e-300))
             if found[0] <= tolerance:
                 break
-        if cap > 0.0 and sweeps < max_sweeps:
+        if highest > 0.0 and sweeps < max_sweeps:
             if step > GROWTH * last_step:
                 momentum_age = 0
                 cap = max(0.0, 1.0 - CAUTION * (1.0 - cap))
+                calm = 0
+            else:
+                calm += 1
+                if calm == RECOVERY:
+                    calm = 0
+                    cap = min(highest, 1.0 - (1.0 - cap) / CAUTION)
             last_step = step
             beta = min(momentum_age / (momentum_age + 3.0), cap)
             momentum_age += 1

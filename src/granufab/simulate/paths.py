@@ -84,6 +84,14 @@ class _Follower:
         self.next_row = self.next_frame = 0.0
         self._told = 0.0
 
+    def start(self) -> None:
+        """Record the starting state with the forces it came with, at ε_q = 0."""
+        self.simulation.virial_of_impulses()
+        self.write_row()
+        self.write_frame()
+        self.next_row = self.settings.series_interval * (1 - 1e-6)
+        self.next_frame = self.settings.frame_interval * (1 - 1e-6)
+
     def stage(self, index: int, step: Step, done: float, total: float) -> None:
         """Walk one stage; ``done`` and ``total`` are strains for the progress."""
         simulation = self.simulation
@@ -171,7 +179,7 @@ def run(
 ) -> Run:
     """Follow a path of stages from a packing, by Contact Dynamics.
 
-    The first record is the starting state after one converged step at the path's friction.
+    The first record is the starting state with the forces it came with.
 
     Args:
         packing: starting state with masses and a cell.
@@ -204,6 +212,7 @@ def run(
     interrupted = False
     done = 0.0
     try:
+        follower.start()
         for index, step in enumerate(path):
             follower.stage(index, step, done, total)
             done += abs(step.strain or 0.0)

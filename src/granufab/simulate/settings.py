@@ -124,7 +124,7 @@ class Solver(_Settings):
         default=0.05, description="share beta of an overlap removed per step (rigid contacts)"
     )
     time_step: Positive = Field(
-        default=0.2, description="largest time step in sqrt(m/p) (2D) or sqrt(m/(p d)) (3D)"
+        default=0.05, description="largest time step in sqrt(m/p) (2D) or sqrt(m/(p d)) (3D)"
     )
     step_strain: Annotated[float, Field(gt=0, le=1e-2)] = Field(
         default=1e-4, description="largest strain per step"

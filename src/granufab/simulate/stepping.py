@@ -216,6 +216,18 @@ class Simulation:
         steps = max(1, int(np.ceil(strain / (rate * self.step_size) - 1e-9)))
         self.set_loading(self.loading, step=strain / rate / steps)
 
+    def virial_of_impulses(self) -> None:
+        """Stress of the impulses that the candidates hold now, before any solve."""
+        c = self.candidates
+        force = c.normal * c.impulse_n[:, None]
+        if self.dimension == 2:
+            tangent = np.stack([-c.normal[:, 1], c.normal[:, 0]], axis=1)
+            force = force + tangent * c.impulse_t
+        else:
+            force = force + c.impulse_t
+        branch = c.normal * c.length[:, None]
+        self.stress = force.T @ branch / (self.step_size * self.volume)
+
     def stress_error(self) -> float:
         """Worst |σ − σ_ext| / p on the stress-driven components at the last solve [-]."""
         difference = self.stress - self.loading.stress
