@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from granufab.cli.application import app
+from granufab.cli.interruption import watch_signals
 from granufab.errors import (
     CorruptFile,
     GranufabError,
@@ -41,8 +42,9 @@ _BAD_PATH = {
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit the process with its code."""
-    _terminate_like_interrupt()
-    sys.exit(_exit_code(arguments))
+    with watch_signals():
+        code = _exit_code(arguments)
+    sys.exit(code)
 
 
 def _exit_code(arguments: Sequence[str] | None) -> int:
@@ -84,13 +86,3 @@ def _describe(error: OSError) -> str:
     if error.filename is None:
         return str(error)
     return f"{error.filename}: {error.strerror or error}"
-
-
-def _terminate_like_interrupt() -> None:
-    def interrupt(number: int, frame: object) -> None:
-        raise KeyboardInterrupt
-
-    try:
-        signal.signal(signal.SIGTERM, interrupt)
-    except ValueError:  # not the main thread
-        return

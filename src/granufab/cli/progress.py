@@ -5,7 +5,9 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+
+from granufab.cli.interruption import gently, stop_if_asked
 
 __all__ = ["show_progress"]
 
@@ -14,13 +16,19 @@ ENOUGH_TO_TELL = 0.02  # fraction of the work after which the time left is worth
 
 
 @contextmanager
-def show_progress() -> Iterator[Callable[[str, float], None]]:
-    """Give a callable ``progress(text, fraction)`` that shows how far a computation is."""
-    if sys.stderr.isatty():
-        with _bar() as report:
-            yield report
-    else:
-        yield _lines()
+def show_progress(*, gentle: bool = False) -> Iterator[Callable[[str, float], None]]:
+    """Give a callable ``progress(text, fraction)`` that shows how far a computation is.
+
+    Once a signal has come the callable raises KeyboardInterrupt; with ``gentle`` only there.
+    """
+    display = _bar() if sys.stderr.isatty() else nullcontext(_lines())
+    with gently(gentle), display as show:
+
+        def report(text: str, fraction: float) -> None:
+            stop_if_asked()
+            show(text, fraction)
+
+        yield report
 
 
 @contextmanager

@@ -41,7 +41,7 @@ def run(
     overrides = (*(set_ or ()), *(() if seed is None else (f"sample.seed={seed}",)))
     settings = load_case(case, overrides)
     folder = case.with_suffix("") if out is None else out
-    with show_progress() as progress:
+    with show_progress(gentle=True) as progress:
         result = run_into_folder(settings, folder, force=force, progress=progress)
     pairs = [*_fabric_pairs(settings, result), *solver_pairs(result.summary)]
     print_pairs(result.name, [*pairs, ("files in", folder)])
