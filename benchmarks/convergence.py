@@ -38,8 +38,8 @@ GROUPS: dict[str, list[dict[str, float]]] = {
     "stiff": [job(r, 1.6e5, 1e-3, 5e-5) for r in (1e-2, 1e-3, 1e-4, 1e-5)],
     "rigid": [job(r, INF, 1e-3, 5e-5) for r in (1e-2, 1e-3, 1e-4, 1e-5)],
     # residual at I = 1e-4
-    "slow": [job(r, 5e4, 1e-4, 1e-5) for r in (1e-2, 1e-3, 1e-4, 1e-5)],
-    "slow-rigid": [job(r, INF, 1e-4, 1e-5) for r in (1e-2, 1e-3, 1e-4)],
+    "slow": [job(r, 5e4, 1e-4, 5e-6) for r in (1e-2, 1e-3, 1e-4, 1e-5)],
+    "slow-rigid": [job(r, INF, 1e-4, 2e-5) for r in (1e-2, 1e-3, 1e-4)],
     # inertial number and strain per step at fixed residual
     "rate": [
         job(1e-5, 5e4, 1e-2, 1e-4),

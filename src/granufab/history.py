@@ -147,7 +147,9 @@ class Run:
             yield self.frames[index].packing
 
 
-def series_dataset(rows: Sequence[Mapping[str, float]], attributes: Mapping[str, Any]) -> xr.Dataset:
+def series_dataset(
+    rows: Sequence[Mapping[str, float]], attributes: Mapping[str, Any]
+) -> xr.Dataset:
     """Rows of a series as a Dataset with units and definitions.
 
     Args:

@@ -241,7 +241,7 @@ class Cell:
         for k in walls:
             off = np.delete(self.matrix[k], k).tolist() + np.delete(self.matrix[:, k], k).tolist()
             if np.any(off):
-                raise InvalidPacking(f"axis {k} has walls, so its lattice vector must not be tilted")
+                raise InvalidPacking(f"axis {k} has walls, its lattice vector must not be tilted")
 
     @property
     def volume(self) -> float:

@@ -284,21 +284,20 @@ def test_contact_stress_is_the_external_one_and_the_cells_acceleration(name, sol
         assert simulation.stress == pytest.approx(measured, rel=1e-12, abs=1e-14)
 
 
-@pytest.mark.parametrize("name", ["constant mean", "biaxial"])
-def test_momentum_and_plain_sweeps_reach_the_same_velocities(name, loose):
+@pytest.mark.parametrize("loading", [ConstantMean(rate=1e-3), Biaxial(axial_rate=1e-3)])
+def test_momentum_and_plain_sweeps_reach_the_same_velocities(loading, dense):
     """The acceleration changes the way, not the end; judged with springs, where it is unique."""
     reached, sweeps = [], []
     for momentum in (True, False):
-        solver = Solver(tolerance=1e-11, max_sweeps=200_000, momentum=momentum)
-        simulation = Simulation(
-            loose, LOADINGS[name], material=Material(friction=0.4), solver=solver
-        )
-        report = simulation.step()
-        assert report.converged
+        solver = Solver(tolerance=1e-10, max_sweeps=200_000, momentum=momentum)
+        simulation = Simulation(dense, loading, material=Material(friction=0.4), solver=solver)
+        reports = [simulation.step() for _ in range(5)]
+        assert all(report.converged for report in reports)
         reached.append((velocity(simulation), simulation.rate, simulation.stress))
-        sweeps.append(report.sweeps)
+        sweeps.append(sum(report.sweeps for report in reports))
     size = np.abs(reached[0][0]).max()
-    assert np.abs(reached[0][0] - reached[1][0]).max() < 1e-7 * size
+    assert np.abs(reached[0][0] - reached[1][0]).max() < 1e-6 * size
     assert reached[0][1] == pytest.approx(reached[1][1], abs=1e-9)
     assert reached[0][2] == pytest.approx(reached[1][2], abs=1e-8)
+    print(sweeps)
     assert sweeps[0] < sweeps[1]

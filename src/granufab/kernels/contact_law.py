@@ -93,8 +93,6 @@ def cone_defect(p_n, p_t, u_n, u_t, rho, mu):
     return (p_n - new_n) ** 2 + norm2(change)
 
 
-
-
 def coupled_law(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
     """Exact 2D law with W_nt ≠ 0 (:func:`slide_or_stick`); in 3D :func:`separate_law`.
 
@@ -107,7 +105,7 @@ def coupled_law(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
     return separate_law(p_n, p_t, u_n, u_t, w_nn, w_tt, mu)
 
 
-@overload(coupled_law, jit_options=ARITHMETIC)
+@overload(coupled_law, jit_options=ARITHMETIC)  # type: ignore[arg-type]
 def _coupled_law(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
     def disk(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
         new_n, new_t = slide_or_stick(p_n, p_t[0], u_n, u_t[0], w_nn, w_nt, w_tt, mu)

@@ -22,7 +22,7 @@ def insert_randomly(radius, size, periodic, tries, seed):
     Returns:
         positions (count, D) and the number placed.
     """
-    np.random.seed(seed)
+    np.random.seed(seed)  # noqa: NPY002  (numba's own stream)
     count, dimension = len(radius), len(size)
     widest = 2.0 * radius.max()
     bins = np.empty(dimension, np.int64)
@@ -42,11 +42,12 @@ def insert_randomly(radius, size, periodic, tries, seed):
             home = 0
             for k in range(dimension):
                 low = 0.0 if periodic[k] else radius[i]
-                trial[k] = low + (size[k] - 2.0 * low) * np.random.random()
+                trial[k] = low + (size[k] - 2.0 * low) * np.random.random()  # noqa: NPY002
                 where[k] = min(int(trial[k] / size[k] * bins[k]), bins[k] - 1)
                 home = home * bins[k] + where[k]
-            if not _overlaps(trial, radius, i, position, size, periodic, bins, where, head,
-                             following):
+            if not _overlaps(
+                trial, radius, i, position, size, periodic, bins, where, head, following
+            ):
                 for k in range(dimension):
                     position[i, k] = trial[k]
                 following[i] = head[home]

@@ -6,10 +6,14 @@ maximum; so no kernel may rely on NaN: states are checked for it outside (``stat
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeVar
 
 from numba import njit
+from numba.core import config
 
 __all__ = ["ARITHMETIC", "kernel"]
 
@@ -17,6 +21,25 @@ F = TypeVar("F", bound=Callable[..., Any])
 ARITHMETIC: dict[str, Any] = {"fastmath": {"contract", "nsz", "nnan"}, "error_model": "numpy"}
 
 
+def _cache_folder() -> str:
+    """Where compiled kernels lie: a user cache folder named by a hash of the kernels' text.
+
+    Numba notices a change only in the file that holds a function, not in those it inlines, so
+    a new version of the package must never meet kernels compiled from an older one.
+    """
+    home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    base = Path(home) if home else Path.home() / ".cache"
+    text = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        text.update(path.read_bytes())
+    return str(base / "granufab" / f"kernels-{text.hexdigest()[:16]}")
+
+
+if not config.CACHE_DIR:  # type: ignore[attr-defined]
+    config.CACHE_DIR = _cache_folder()  # type: ignore[attr-defined]
+
+
 def kernel(function: F) -> F:
     """Compile ``function`` with the package's options, cached on disk, releasing the GIL."""
-    return njit(cache=True, nogil=True, **ARITHMETIC)(function)
+    compiled: Any = njit(cache=True, nogil=True, **ARITHMETIC)(function)
+    return compiled

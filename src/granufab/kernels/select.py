@@ -24,5 +24,3 @@ def select_active(pairs, gap, impulse_n, motion, limits, active, like):
             continue
         speed = norm(load(motion, pairs[c, 0], like)) + norm(load(motion, pairs[c, 1], like))
         active[c] = impulse_n[c] > 0.0 or gap[c] < margin + step * (speed + rate * abs(gap[c]))
-
-

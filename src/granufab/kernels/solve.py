@@ -2,9 +2,10 @@
 
 Momentum: x_{k+1} = sweep(y_k), y_{k+1} = x_{k+1} + β_k (x_{k+1} − x_k) with β_k = min(k/(k+3),
 cap). When the step norm ‖x_{k+1} − y_k‖ grows by more than 1.02 the momentum restarts and 1 − cap
-grows by 1.3; after 15 sweeps without a restart 1 − cap shrinks by 1.3 again. Velocities are affine in the impulses, so both are extrapolated alike. The residual
-is taken only on an unextrapolated iterate, when the step norm promises that it is met, and at
-least every ``CHECK`` sweeps.
+grows by 1.3; after 15 sweeps without a restart 1 − cap shrinks by 1.3 again. Velocities are
+affine in the impulses, so both are extrapolated alike. The residual is taken only on an
+unextrapolated iterate, when the step norm promises that it is met, and at least every ``CHECK``
+sweeps.
 """
 
 from __future__ import annotations

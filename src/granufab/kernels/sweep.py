@@ -91,19 +91,31 @@ def sweep(problem: Problem, state: State, like, lag):
         until -= 1
         if until == 0:
             until = lag
+            dilation += pending_dilation
+            pending_dilation = 0.0
             if problem.coupled:
-                rate += pending
-                pending[:] = 0.0
-            else:
-                dilation += pending_dilation
-                pending_dilation = 0.0
+                hand_on(rate, pending)
     if problem.coupled:
-        rate += pending
+        hand_on(rate, pending)
     else:
-        dilation += pending_dilation
-        for k in range(len(like)):
-            rate[k, k] = dilation
+        set_diagonal(rate, dilation + pending_dilation)
     return moved
+
+
+@kernel
+def hand_on(rate, pending):
+    """Add the pending change to the free cell rates and clear it."""
+    for k in range(len(rate)):
+        for l in range(len(rate)):
+            rate[k, l] += pending[k, l]
+            pending[k, l] = 0.0
+
+
+@kernel
+def set_diagonal(rate, dilation):
+    """Write a uniform dilation rate."""
+    for k in range(len(rate)):
+        rate[k, k] = dilation
 
 
 @kernel
@@ -177,5 +189,3 @@ def apply_impulses(problem: Problem, state: State, like):
     if not problem.coupled:
         for k in range(len(like)):
             rate[k, k] += dilation
-
-

@@ -1,8 +1,8 @@
 """Contact Dynamics of disks and spheres: samples, loading, stepping, runs."""
 
 from granufab.simulate.loading import Biaxial, ConstantMean, Isotropic, Loading, SimpleShear
-from granufab.simulate.preparation import Prepared, compress, prepare
 from granufab.simulate.paths import Step, run, run_case, shear
+from granufab.simulate.preparation import Prepared, compress, prepare
 from granufab.simulate.sample import draw_radii, random_sample
 from granufab.simulate.settings import Case, Material, Record, Sample, Sizes, Solver, Stage
 from granufab.simulate.stepping import Simulation
@@ -17,8 +17,8 @@ __all__ = [
     "Prepared",
     "Record",
     "Sample",
-    "Simulation",
     "SimpleShear",
+    "Simulation",
     "Sizes",
     "Solver",
     "Stage",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from granufab.kernels.motion import measure_gaps, turn_tangents
 from granufab.kernels.neighbours import conflict_free_order, find_pairs, find_wall_pairs
 from granufab.packing import Array, Contacts, IntArray, WallContacts
 
@@ -36,6 +37,7 @@ class Candidates:
         self.active = np.zeros(count, dtype=np.bool_)
         self.impulse_n = np.zeros(count)
         self.impulse_t = np.zeros((count, self.tangents))
+        self.memory_t = np.zeros((count, self.tangents))
         self.friction = np.zeros(count)
 
     @property
@@ -107,6 +109,44 @@ class Candidates:
         known = old_keys[source] == keys
         self.impulse_n[known] = old_n[source[known]]
         self.impulse_t[known] = old_t[source[known]]
+
+    def measure(
+        self,
+        position: Array,
+        radius: Array,
+        matrix: Array,
+        origin: Array,
+        like: tuple[float, ...],
+    ) -> None:
+        """Normals, lengths and gaps at the present positions; impulses turn with the normals."""
+        measure_gaps(
+            position, radius, matrix, origin, self.pairs, self.images, self.grain_count,
+            self.normal, self.length, self.gap,
+        )  # fmt: skip
+        if self.dimension == 3:
+            turn_tangents(self.impulse_t, self.normal, like)
+
+    def impulses(self) -> Array:
+        """P of every candidate in global axes [N s], shape (count, D)."""
+        along = self.impulse_n[:, None] * self.normal
+        if self.dimension == 3:
+            return along + self.impulse_t
+        return along + self.impulse_t * np.stack([-self.normal[:, 1], self.normal[:, 0]], axis=1)
+
+    def virial(self) -> Array:
+        """Σ P⊗ℓ over all candidates [N m s], shape (D, D)."""
+        return self.impulses().T @ (self.normal * self.length[:, None])
+
+    def remember_tangents(self) -> None:
+        """Keep the tangential impulses the step began with: the springs' memory."""
+        self.memory_t[:] = self.impulse_t
+
+    def keep_impulses(self, chosen: IntArray, impulse_n: Array, impulse_t: Array) -> None:
+        """Take the solved impulses; pairs outside the solve carry none."""
+        self.impulse_n[:] = 0.0
+        self.impulse_t[:] = 0.0
+        self.impulse_n[chosen] = impulse_n
+        self.impulse_t[chosen] = impulse_t
 
     def shear_images(self, flow: int, axis: int, turns: int) -> None:
         """Rewrite images after lattice vector ``axis`` lost ``turns`` of vector ``flow``."""

@@ -31,7 +31,7 @@ def capture_packing(simulation: Simulation, *, reach: float = 0.05, source: str 
     walls = c.pairs[:, 1] >= s.grain_count
     near = (c.gap <= reach * s.scales.diameter) | (c.impulse_n > 0)
     kept, on_wall = near & ~walls, near & walls
-    force = _forces(simulation)
+    force = c.impulses() / s.step_size
     dimension = s.dimension
     spins = 1 if dimension == 2 else 3
     rows = s.motion[: s.grain_count]
@@ -70,18 +70,6 @@ def capture_packing(simulation: Simulation, *, reach: float = 0.05, source: str 
         time=s.time,
         source=source,
     )
-
-
-def _forces(simulation: Simulation) -> Array:
-    """Contact forces P/h on the second body [N], shape (candidate_count, D)."""
-    c = simulation.candidates
-    impulse = c.impulse_n[:, None] * c.normal
-    if simulation.dimension == 2:
-        tangent = np.stack([-c.normal[:, 1], c.normal[:, 0]], axis=1)
-        impulse = impulse + c.impulse_t * tangent
-    else:
-        impulse = impulse + c.impulse_t
-    return impulse / simulation.step_size
 
 
 def measure_now(

@@ -88,9 +88,7 @@ def _axes(axis: int, dimension: int) -> tuple[Array, Array]:
     return np.eye(dimension)[axis], np.eye(dimension)[(axis + 1) % dimension]
 
 
-def Isotropic(  # noqa: N802
-    *, pressure: float = 1.0, dimension: int = 2, diagonals: bool = False
-) -> Loading:
+def Isotropic(*, pressure: float = 1.0, dimension: int = 2, diagonals: bool = False) -> Loading:
     """Isotropic stress p; free dilation, or all diagonal components free.
 
     Args:
@@ -109,7 +107,7 @@ def Isotropic(  # noqa: N802
     )
 
 
-def ConstantMean(  # noqa: N802
+def ConstantMean(
     *, rate: float, pressure: float = 1.0, axis: int = 1, dimension: int = 2
 ) -> Loading:
     """Shear at constant mean stress with imposed ε̇_q: the loading of [Radjai2012, Figs 5, 7, 8].
@@ -130,7 +128,7 @@ def ConstantMean(  # noqa: N802
     )
 
 
-def Biaxial(  # noqa: N802
+def Biaxial(
     *, axial_rate: float, pressure: float = 1.0, axis: int = 1, dimension: int = 2
 ) -> Loading:
     """Compression at ``axial_rate`` along ``axis`` with constant stress on the other axes.
@@ -152,7 +150,7 @@ def Biaxial(  # noqa: N802
     )
 
 
-def SimpleShear(  # noqa: N802
+def SimpleShear(
     *,
     rate: float,
     pressure: float = 1.0,

@@ -15,13 +15,14 @@ from granufab.packing import Packing
 from granufab.simulate.capture import StepTally, capture_frame, merge, series_row
 from granufab.simulate.loading import Loading, loading_of_stage
 from granufab.simulate.preparation import Prepared, prepare
+from granufab.simulate.scales import Scales
 from granufab.simulate.settings import Case, Material, Record, Sample, Solver, Stage
 from granufab.simulate.stepping import Simulation
+from granufab.simulate.summary import summarise
 
 __all__ = ["Step", "run", "run_case", "shear"]
 
 Progress = Callable[[str, float], None]
-QUASI_STATIC = 3e-3
 REST_ENERGY = 1e-8
 SECONDS_BETWEEN_NEWS = 0.3
 
@@ -86,7 +87,7 @@ class _Follower:
 
     def start(self) -> None:
         """Record the starting state with the forces it came with, at ε_q = 0."""
-        self.simulation.virial_of_impulses()
+        self.simulation.stress = self.simulation.stress_of_impulses()
         self.write_row()
         self.write_frame()
         self.next_row = self.settings.series_interval * (1 - 1e-6)
@@ -218,7 +219,8 @@ def run(
             done += abs(step.strain or 0.0)
     except KeyboardInterrupt:
         interrupted = True
-    summary = _summary(follower, simulation, time.perf_counter() - began)
+    seconds = time.perf_counter() - began
+    summary = summarise(simulation, follower.all, memory.frames, seconds)
     summary["interrupted"] = interrupted
     attributes = {
         "criterion": "force",
@@ -234,41 +236,6 @@ def run(
         summary=summary,
         name=name,
     )
-
-
-def _summary(follower: _Follower, simulation: Simulation, seconds: float) -> dict[str, Any]:
-    whole = merge(follower.all)
-    inertial = follower.place["inertial_number"]
-    summary: dict[str, Any] = {
-        "steps": whole.steps,
-        "nonconverged_steps": whole.nonconverged,
-        "sweeps_mean": whole.sweeps,
-        "residual_max": whole.residual,
-        "overlap_max": whole.overlap,
-        "violation_max": whole.violation,
-        "pressure_error_max": whole.pressure_error,
-        "contact_updates": whole.contact_updates,
-        "kinetic_ratio": whole.kinetic_ratio,
-        "seconds": seconds,
-        "seconds_by_stage": dict(simulation.seconds),
-        "tolerance": simulation.solver.tolerance,
-        "stiffness": simulation.solver.stiffness,
-        "step_size": simulation.step_size,
-        "inertial_number_max": inertial,
-        "friction": simulation.material.friction,
-        "grain_count": simulation.grain_count,
-        "neighbour_searches": simulation.searches,
-        "criterion": "force",
-    }
-    warnings = []
-    if inertial > QUASI_STATIC:
-        warnings.append(f"inertial number {inertial:.1e} is above {QUASI_STATIC:.0e}: "
-                        "not quasi-static")
-    if whole.nonconverged:
-        warnings.append(f"{whole.nonconverged} of {whole.steps} steps ended above the tolerance "
-                        f"{simulation.solver.tolerance:.1e}, worst residual {whole.residual:.1e}")
-    summary["warnings"] = warnings
-    return summary
 
 
 def _stage_rate(stage: Stage, simulation_time: float) -> float:
@@ -295,8 +262,6 @@ def run_case(
     Raises:
         NotConverged: the wanted coordination cannot be reached, or a strict solver fails.
     """
-    from granufab.simulate.stepping import Scales
-
     tell = progress or (lambda text, fraction: None)
     began = time.perf_counter()
     prepared = start or prepare(case.sample, progress=lambda t, f: tell(t, 0.5 * f))
@@ -373,7 +338,9 @@ def shear(
     case = Case(
         name=name,
         sample=Sample(
-            grain_count=packing.grains.count, dimension=packing.dimension, pressure=pressure  # type: ignore[arg-type]
+            grain_count=packing.grains.count,
+            dimension=packing.dimension,  # type: ignore[arg-type]
+            pressure=pressure,
         ),
         material=Material(friction=friction),
         solver=solver or Solver(),

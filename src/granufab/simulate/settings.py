@@ -144,7 +144,7 @@ class Stage(_Settings):
     )
     strain: float = Field(
         default=0.3,
-        description="deviatoric strain of this stage; negative reverses; isotropic: compaction",
+        description="deviatoric strain, negative reverses; isotropic ignores it: relaxes to rest",
     )
     inertial_number: Positive | None = Field(
         default=1e-3,

@@ -17,69 +17,28 @@ from granufab.kernels.motion import (
     drift,
     find_missed,
     kinetic_energy,
-    measure_gaps,
-    relative_velocity,
-    set_offsets,
-    turn_tangents,
     virial,
 )
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.select import select_active
 from granufab.kernels.solve import solve
 from granufab.kernels.sweep import apply_impulses
-from granufab.packing import Array, Packing, require
+from granufab.packing import Array, IntArray, Packing, require
+from granufab.simulate.assembly import Buffers, StepLaw, assemble, impulse_copies
+from granufab.simulate.bodies import body_records
 from granufab.simulate.candidates import Candidates
+from granufab.simulate.cell_motion import matrix_exponential, shorten_cell
 from granufab.simulate.loading import Loading
+from granufab.simulate.scales import Scales
 from granufab.simulate.settings import Material, Solver
 
-__all__ = ["Scales", "Simulation", "StepReport"]
+__all__ = ["Simulation", "StepReport"]
 
 MOMENTUM_CAP = 0.9
 ACTIVE_MARGIN = 2e-3
 MISSED_TOLERANCE = 1e-6
 RESOLVES = 3
 OVERLAP_LIMIT = 0.5
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Scales:
-    """Reference scales of a packing under pressure p.
-
-    Attributes:
-        diameter: mean diameter d [m].
-        mass: mean mass m [kg].
-        pressure: p [N/m^(D−1)].
-        time: √(m/p) in 2D, √(m/(p d)) in 3D [s].
-        inertial_time: I = ε̇_q · this; √(m/p) in 2D, d √(ρ/p) in 3D [s].
-        force: p d^{D−1} [N].
-    """
-
-    diameter: float
-    mass: float
-    pressure: float
-    time: float
-    inertial_time: float
-    force: float
-
-    @classmethod
-    def of(cls, packing: Packing, pressure: float) -> Scales:
-        """Scales of the grains of ``packing``; they need masses."""
-        grains = packing.grains
-        diameter = float(2 * grains.radius.mean())
-        mass = float(require(grains.mass, "grain masses").mean())
-        time_scale = float(np.sqrt(mass / (pressure * diameter ** (grains.dimension - 2))))
-        inertial = time_scale
-        if grains.dimension == 3:
-            volume = float((4 / 3 * np.pi * grains.radius**3).mean())
-            inertial = diameter * float(np.sqrt(mass / volume / pressure))
-        return cls(
-            diameter=diameter,
-            mass=mass,
-            pressure=pressure,
-            time=time_scale,
-            inertial_time=inertial,
-            force=pressure * diameter ** (grains.dimension - 1),
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -94,12 +53,6 @@ class StepReport:
     converged: bool
     contacts: int
     resolves: int
-
-
-def _matrix_exponential(matrix: Array) -> Array:
-    """exp of a small matrix of norm ≪ 1 by its series to fourth order (error ~ |A|⁵/120)."""
-    square = matrix @ matrix
-    return np.eye(len(matrix)) + matrix + square / 2 + square @ matrix / 6 + square @ square / 24
 
 
 class Simulation:
@@ -143,9 +96,9 @@ class Simulation:
         self.solid_volume = float(ball.sum())
         self.position = grains.position.copy()
         self.number = grains.number
-        self.matrix, self.origin = cell.matrix.copy(), cell.origin.copy()
+        self.matrix, self.origin = cell.matrix.copy(), np.array(cell.origin)
         self.periodic = np.array(cell.periodic)
-        self.rate = cell.rate.copy()
+        self.rate = np.array(cell.rate)
         self.time = packing.time or 0.0
         self.strain = np.zeros((self.dimension, self.dimension))
         self.remap = np.eye(self.dimension, dtype=np.int64)
@@ -154,7 +107,10 @@ class Simulation:
         self.rate_cap, self.damping = rate_cap, damping
         self.like = (0.0,) * self.dimension
         self.spin_factor = (2.0 if self.dimension == 2 else 2.5) if rotation else 0.0
-        self._make_motion(packing)
+        self.motion = body_records(packing)
+        self.free_motion, self._before_motion = self.motion.copy(), self.motion.copy()
+        self.walked = np.zeros((self.grain_count, self.dimension))
+        self.strain_walked = 0.0
         self.candidates = Candidates(self.grain_count, self.dimension)
         self.stress = np.zeros((self.dimension, self.dimension))
         self.step_size = 0.0
@@ -165,24 +121,6 @@ class Simulation:
         self._search()
         self._measure_gaps()
         self.candidates.seed_impulses(packing.contacts, packing.wall_contacts, self.step_size)
-
-    # --- setting up -----------------------------------------------------------------------
-
-    def _make_motion(self, packing: Packing) -> None:
-        grains, dimension = packing.grains, self.dimension
-        spins = 1 if dimension == 2 else 3
-        width = 4 if dimension == 2 else 8
-        self.motion = np.zeros((self.grain_count + 2 * dimension, width))
-        rows = self.motion[: self.grain_count]
-        if grains.velocity is not None:
-            rows[:, :dimension] = grains.velocity
-        if grains.spin is not None:
-            rows[:, dimension : dimension + spins] = grains.spin * self.radius[:, None]
-        rows[:, dimension + spins] = 1.0 / self.mass
-        self.free_motion = self.motion.copy()
-        self._before_motion = self.motion.copy()
-        self.walked = np.zeros((self.grain_count, dimension))
-        self.strain_walked = 0.0
 
     def set_loading(self, loading: Loading, *, step: float | None = None) -> None:
         """Change what drives the cell; impulses are rescaled to the new time step."""
@@ -216,17 +154,9 @@ class Simulation:
         steps = max(1, int(np.ceil(strain / (rate * self.step_size) - 1e-9)))
         self.set_loading(self.loading, step=strain / rate / steps)
 
-    def virial_of_impulses(self) -> None:
+    def stress_of_impulses(self) -> Array:
         """Stress of the impulses that the candidates hold now, before any solve."""
-        c = self.candidates
-        force = c.normal * c.impulse_n[:, None]
-        if self.dimension == 2:
-            tangent = np.stack([-c.normal[:, 1], c.normal[:, 0]], axis=1)
-            force = force + tangent * c.impulse_t
-        else:
-            force = force + c.impulse_t
-        branch = c.normal * c.length[:, None]
-        self.stress = force.T @ branch / (self.step_size * self.volume)
+        return self.candidates.virial() / (self.step_size * self.volume)
 
     def stress_error(self) -> float:
         """Worst |σ − σ_ext| / p on the stress-driven components at the last solve [-]."""
@@ -242,8 +172,6 @@ class Simulation:
         if self.periodic.all():
             rows = self.motion[: self.grain_count, : self.dimension]
             rows -= (self.mass @ rows) / self.mass.sum()
-
-    # --- one step -------------------------------------------------------------------------
 
     def step(self) -> StepReport:
         """Advance by ``step_size``.
@@ -277,7 +205,7 @@ class Simulation:
 
     def _half_drift(self) -> None:
         half = 0.5 * self.step_size
-        affine = _matrix_exponential(half * self.rate)
+        affine = matrix_exponential(half * self.rate)
         drift(self.position, self.motion, affine, half)
         self.matrix = affine @ self.matrix
         self.origin = affine @ self.origin
@@ -298,7 +226,7 @@ class Simulation:
         return ACTIVE_MARGIN * self.scales.diameter
 
     def _search(self) -> None:
-        self._remap()
+        shorten_cell(self.matrix, self.periodic, self.remap, self.candidates.shear_images)
         self.candidates.search(
             self.position,
             self.radius,
@@ -310,55 +238,22 @@ class Simulation:
         self.strain_walked = 0.0
         self._farthest = 0.0
         self.searches += 1
-        self._resize(self.candidates.count)
-
-    def _remap(self) -> None:
-        """Replace a lattice vector tilted beyond 1/2 by its shorter equivalent."""
-        for axis in range(self.dimension):
-            for flow in range(self.dimension):
-                if axis == flow or not (self.periodic[axis] and self.periodic[flow]):
-                    continue
-                turns = round(self.matrix[flow, axis] / self.matrix[flow, flow])
-                if abs(self.matrix[flow, axis]) > 0.5001 * self.matrix[flow, flow] and turns:
-                    self.matrix[:, axis] -= turns * self.matrix[:, flow]
-                    self.candidates.shear_images(flow, axis, turns)
-                    self.remap[:, axis] -= turns * self.remap[:, flow]
-
-    def _resize(self, count: int) -> None:
-        tangents = self.candidates.tangents
-        self._normal = np.empty((count, self.dimension))
-        self._length, self._offset_n, self._bounce = np.empty((3, count))
-        self._offset_t, self._impulse_t, self._old_t, self._slip = np.empty((4, count, tangents))
-        self._impulse_n, self._before_n = np.empty((2, count))
-        self._before_t = np.empty((count, tangents))
+        self._buffers = Buffers.of(self.candidates.count, self.dimension)
 
     def _measure_gaps(self) -> None:
-        c = self.candidates
-        measure_gaps(
-            self.position,
-            self.radius,
-            self.matrix,
-            self.origin,
-            c.pairs,
-            c.images,
-            self.grain_count,
-            c.normal,
-            c.length,
-            c.gap,
-        )
-        if self.dimension == 3:
-            turn_tangents(c.impulse_t, c.normal, self.like)
+        self.candidates.measure(self.position, self.radius, self.matrix, self.origin, self.like)
 
     def _select(self) -> None:
-        c = self.candidates
+        touching = 1e-10 * self.scales.diameter
         margin = -1.0 if self.material.restitution > 0 else self._margin
+        limits = (margin, self.step_size, float(np.linalg.norm(self.rate)), touching)
         select_active(
-            c.pairs,
-            c.gap,
-            c.impulse_n,
+            self.candidates.pairs,
+            self.candidates.gap,
+            self.candidates.impulse_n,
             self.motion,
-            (margin, self.step_size, float(np.linalg.norm(self.rate)), 1e-10 * self.scales.diameter),
-            c.active,
+            limits,
+            self.candidates.active,
             self.like,
         )
 
@@ -386,29 +281,19 @@ class Simulation:
         return float(np.linalg.det(self.matrix))
 
     def _solve(self, rate_before: Array) -> StepReport:
+        """Solve, and again while a pair left out of the solve would overlap by its end."""
         sweeps, resolves = 0, 0
+        law = self._law()
+        self.candidates.remember_tangents()
         while True:
-            problem, state, before = self._assemble(rate_before)
-            count, residual, share, violation = self._iterate(problem, state, before)
+            problem, chosen = assemble(
+                self.candidates, self._buffers, law, (self._start_motion(), rate_before), self.like
+            )
+            count, residual, share, violation = self._iterate(problem)
             sweeps += count
-            self.contact_updates += count * len(problem.length)
-            self._store(problem, state)
-            missed = 0
-            if self.material.restitution == 0 and resolves < RESOLVES:
-                c = self.candidates
-                missed = find_missed(
-                    c.pairs,
-                    c.normal,
-                    c.length,
-                    c.gap,
-                    c.active,
-                    self.motion,
-                    self.rate,
-                    self.step_size,
-                    MISSED_TOLERANCE * self.scales.diameter,
-                    self.like,
-                )
-            if not missed:
+            self.contact_updates += count * len(chosen)
+            self._store(problem, chosen)
+            if self.material.restitution > 0 or resolves == RESOLVES or not self._missed():
                 break
             resolves += 1
         overlap = max(0.0, -float(self.candidates.gap.min(initial=0.0))) / self.scales.diameter
@@ -419,96 +304,63 @@ class Simulation:
             violation=violation * self.step_size / self.scales.diameter,
             overlap=overlap,
             converged=residual <= self.solver.tolerance,
-            contacts=len(problem.length),
+            contacts=len(chosen),
             resolves=resolves,
         )
 
-    def _assemble(self, rate_before: Array) -> tuple[Problem, State, State]:
+    def _missed(self) -> int:
         c = self.candidates
-        chosen = np.flatnonzero(c.active)
-        count = len(chosen)
-        self._chosen = chosen
-        pairs = c.pairs[chosen]
-        np.take(c.normal, chosen, axis=0, out=self._normal[:count])
-        np.take(c.length, chosen, out=self._length[:count])
-        np.take(c.impulse_n, chosen, out=self._impulse_n[:count])
-        np.take(c.impulse_t, chosen, axis=0, out=self._impulse_t[:count])
-        self._old_t[:count] = self._impulse_t[:count]
+        tolerance = MISSED_TOLERANCE * self.scales.diameter
+        return find_missed(
+            c.pairs, c.normal, c.length, c.gap, c.active,
+            self.motion, self.rate, self.step_size, tolerance, self.like,
+        )  # fmt: skip
+
+    def _law(self) -> StepLaw:
         stiffness = self.solver.stiffness * self.scales.force / self.scales.diameter
-        softness = 0.0
-        if np.isfinite(stiffness) and self.material.restitution == 0:
-            softness = 1 / (stiffness * self.step_size**2)
-        problem = Problem(
-            first=np.ascontiguousarray(pairs[:, 0]),
-            second=np.ascontiguousarray(pairs[:, 1]),
-            normal=self._normal[:count],
-            length=self._length[:count],
-            offset_n=self._offset_n[:count],
-            offset_t=self._offset_t[:count],
-            mu=c.friction[chosen],
-            softness=softness,
+        soft = np.isfinite(stiffness) and self.material.restitution == 0
+        return StepLaw(
+            step=self.step_size,
+            softness=1 / (stiffness * self.step_size**2) if soft else 0.0,
+            overlap_correction=self.solver.overlap_correction,
+            restitution=self.material.restitution,
             spin_factor=self.spin_factor,
             coupled=self.coupled,
             dilation_weight=self.dilation_weight,
             weight=self.weight,
+            imposed=self.loading.rate,
         )
-        bounce = self._bounce[:count]
-        bounce[:] = 0.0
-        restitution = self.material.restitution
-        if restitution > 0:
-            relative_velocity(
-                problem, self._step_start_motion(), rate_before, self.like, bounce,
-                self._slip[:count],
-            )
-            bounce *= restitution
-        set_offsets(
-            problem,
-            c.gap[chosen],
-            self.loading.rate,
-            bounce,
-            (self.step_size, self.solver.overlap_correction, restitution),
-            self._old_t[:count],
-            self.like,
-        )
-        self.motion[:] = self.free_motion
-        state = State(
-            self.motion, self.free_rate.copy(), self._impulse_n[:count], self._impulse_t[:count]
-        )
-        apply_impulses(problem, state, self.like)
-        before = State(
-            self._before_motion,
-            np.empty_like(self.free_rate),
-            self._before_n[:count],
-            self._before_t[:count],
-        )
-        return problem, state, before
 
-    def _step_start_motion(self) -> Array:
-        """Motion at the start of the step (free velocities before gravity acted)."""
+    def _start_motion(self) -> Array:
+        """Motion at the start of the step: free velocities before gravity acted."""
+        if not self.gravity.any():
+            return self.free_motion
         start = self.free_motion.copy()
         start[: self.grain_count, : self.dimension] -= self.step_size * self.gravity
         return start
 
-    def _iterate(self, problem: Problem, state: State, before: State):
+    def _iterate(self, problem: Problem) -> tuple[int, float, float, float]:
+        count = len(problem.length)
+        impulse_n, impulse_t, before_n, before_t = impulse_copies(self._buffers, count)
+        self.motion[:] = self.free_motion
+        state = State(self.motion, self.free_rate.copy(), impulse_n, impulse_t)
+        apply_impulses(problem, state, self.like)
+        before = State(self._before_motion, np.empty_like(self.free_rate), before_n, before_t)
         cap = MOMENTUM_CAP if self.solver.momentum else 0.0
         floor = self.scales.force * self.step_size
-        lag = min(64, max(1, len(problem.length) // 50))
+        lag = min(64, max(1, count // 50))
         settings = (self.solver.tolerance, self.solver.max_sweeps, cap, floor, lag)
         return solve(problem, state, before, self.like, settings)
 
-    def _store(self, problem: Problem, state: State) -> None:
+    def _store(self, problem: Problem, chosen: IntArray) -> None:
         """Velocities afresh from the impulses (no drift of round-off), impulses to the list."""
+        impulse_n, impulse_t, _, _ = impulse_copies(self._buffers, len(chosen))
         self.motion[:] = self.free_motion
-        rate = self.free_rate.copy()
-        final = State(self.motion, rate, state.impulse_n, state.impulse_t)
-        apply_impulses(problem, final, self.like)
-        c = self.candidates
-        c.impulse_n[:] = 0.0
-        c.impulse_t[:] = 0.0
-        c.impulse_n[self._chosen] = state.impulse_n
-        c.impulse_t[self._chosen] = state.impulse_t
-        self.rate = self.loading.rate + rate
-        self.problem, self.state = problem, final
+        self.problem = problem
+        self.state = State(self.motion, self.free_rate.copy(), impulse_n, impulse_t)
+        apply_impulses(problem, self.state, self.like)
+        self.rate = self.loading.rate + self.state.rate
+        self.candidates.keep_impulses(chosen, impulse_n, impulse_t)
 
     def _finish(self, rate_before: Array) -> None:
         push = virial(self.problem, self.state.impulse_n, self.state.impulse_t, self.like)
@@ -524,7 +376,9 @@ class Simulation:
     def _check(self, report: StepReport) -> None:
         if not np.isfinite(self.motion).all() or not np.isfinite(self.rate).all():
             bad = np.flatnonzero(~np.isfinite(self.motion).all(axis=1))[:3]
-            raise InvalidPacking(f"the velocity of grains {bad.tolist()} is not finite after a step")
+            raise InvalidPacking(
+                f"the velocity of grains {bad.tolist()} is not finite after a step"
+            )
         if report.overlap > OVERLAP_LIMIT:
             worst = int(np.argmin(self.candidates.gap))
             i, j = self.candidates.pairs[worst]

@@ -1,0 +1,86 @@
+"""The summary of a path: how it was solved, how homogeneous it stayed, what to be warned of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from granufab.fabric import homogeneity
+from granufab.history import Frame, StepStatistics
+from granufab.simulate.capture import merge
+from granufab.simulate.stepping import Simulation
+
+__all__ = ["summarise"]
+
+QUASI_STATIC = 3e-3
+HOMOGENEITY_STRAIN, HOMOGENEITY_GRAINS = 0.1, 200
+
+
+def summarise(
+    simulation: Simulation,
+    statistics: list[StepStatistics],
+    frames: Sequence[Frame],
+    seconds: float,
+) -> dict[str, Any]:
+    """What a person wants to know of a finished path, as plain data.
+
+    Args:
+        simulation: the system at the end of the path.
+        statistics: of every recorded interval.
+        frames: recorded states.
+        seconds: wall time of the path.
+    """
+    whole = merge(statistics)
+    inertial = max((frame.inertial_number for frame in frames), default=0.0)
+    summary: dict[str, Any] = {
+        "steps": whole.steps,
+        "nonconverged_steps": whole.nonconverged,
+        "sweeps_mean": whole.sweeps,
+        "residual_max": whole.residual,
+        "overlap_max": whole.overlap,
+        "violation_max": whole.violation,
+        "pressure_error_max": whole.pressure_error,
+        "contact_updates": whole.contact_updates,
+        "kinetic_ratio": whole.kinetic_ratio,
+        "seconds": seconds,
+        "seconds_by_stage": dict(simulation.seconds),
+        "tolerance": simulation.solver.tolerance,
+        "stiffness": simulation.solver.stiffness,
+        "step_size": simulation.step_size,
+        "inertial_number_max": inertial,
+        "friction": simulation.material.friction,
+        "grain_count": simulation.grain_count,
+        "neighbour_searches": simulation.searches,
+        "criterion": "force",
+    }
+    warnings = []
+    if inertial > QUASI_STATIC:
+        warnings.append(
+            f"inertial number {inertial:.1e} is above {QUASI_STATIC:.0e}: not quasi-static"
+        )
+    if whole.nonconverged:
+        warnings.append(
+            f"{whole.nonconverged} of {whole.steps} steps ended above the tolerance "
+            f"{simulation.solver.tolerance:.1e}, worst residual {whole.residual:.1e}"
+        )
+    summary["warnings"] = warnings
+    _add_homogeneity(summary, frames)
+    return summary
+
+
+def _add_homogeneity(summary: dict[str, Any], frames: Sequence[Frame]) -> None:
+    """Variance of the local strain over the last part of the path; warns of shear bands."""
+    if not frames or frames[-1].packing.grains.count < HOMOGENEITY_GRAINS:
+        return
+    end = frames[-1]
+    earliest = end.eps_q_total - HOMOGENEITY_STRAIN
+    before = [f for f in frames if f.stage == end.stage and f.eps_q_total <= earliest]
+    if not before:
+        return
+    found = homogeneity((before[-1].packing, end.packing))
+    summary["homogeneity"] = dict(found)
+    if found["localised"]:
+        summary["warnings"].append(
+            f"the strain is not homogeneous: local variance {found['relative_variance']:.2f}, "
+            f"expected {found['expected']:.2f}; look at plot --figure homogeneity for shear bands"
+        )
