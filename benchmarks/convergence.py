@@ -42,12 +42,12 @@ GROUPS: dict[str, list[dict[str, float]]] = {
     "slow-rigid": [job(r, INF, 1e-4, 2e-5) for r in (1e-2, 1e-3, 1e-4)],
     # inertial number and strain per step at fixed residual
     "rate": [
-        job(1e-5, 5e4, 1e-2, 1e-4),
-        job(1e-5, 5e4, 3e-3, 1e-4),
-        job(1e-5, 5e4, 1e-3, 5e-5),
-        job(1e-5, 5e4, 3e-4, 2e-5),
+        job(1e-4, 5e4, 1e-2, 1e-4),
+        job(1e-4, 5e4, 3e-3, 1e-4),
+        job(1e-4, 5e4, 1e-3, 5e-5),
+        job(1e-4, 5e4, 3e-4, 2e-5),
     ],
-    "step": [job(1e-5, 5e4, 1e-3, s) for s in (4e-4, 2e-4, 1e-4, 5e-5, 2e-5)],
+    "step": [job(1e-4, 5e4, 1e-3, s) for s in (4e-4, 2e-4, 1e-4, 5e-5, 2e-5)],
 }
 
 
