@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from physics_cases import spin, velocity
 
-from granufab.packing import Cell, Contacts, Grains, Packing
+from granufab.packing import Grains, Packing
 from granufab.simulate import (
     Biaxial,
     ConstantMean,
