@@ -15,7 +15,16 @@ import xarray as xr
 
 from granufab.packing import Array, Packing
 
-__all__ = ["SERIES_UNITS", "Frame", "FrameSource", "Recorder", "Run", "StepStatistics"]
+__all__ = [
+    "SERIES_UNITS",
+    "Frame",
+    "FrameSource",
+    "Recorder",
+    "Run",
+    "StepStatistics",
+    "frame_before",
+    "series_dataset",
+]
 
 SERIES_UNITS: dict[str, tuple[str, str]] = {
     "eps_q": ("-", "deviatoric strain, running"),
@@ -145,6 +154,25 @@ class Run:
         """The states alone, one after another."""
         for index in range(len(self.frames)):
             yield self.frames[index].packing
+
+
+def frame_before(frames: FrameSource | Sequence[Frame], end: int, strain: float) -> Frame | None:
+    """The latest frame of the same stage at least ``strain`` (in ∫|dε_q|) before frame ``end``.
+
+    Args:
+        frames: recorded states.
+        end: index, may be negative.
+        strain: |Δε_q| between the two.
+    """
+    last = frames[end]
+    index = end if end >= 0 else len(frames) + end
+    for earlier in range(index - 1, -1, -1):
+        frame = frames[earlier]
+        if frame.stage != last.stage:
+            return None
+        if frame.eps_q_total <= last.eps_q_total - strain * (1 - 1e-9):
+            return frame
+    return None
 
 
 def series_dataset(

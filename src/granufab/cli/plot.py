@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 
 __all__ = ["plot"]
 
-Name = Literal["path", "zaz", "series", "mohr", "rose", "network"]
+Name = Literal["path", "zaz", "series", "mohr", "rose", "network", "homogeneity"]
 Definition = Literal["z", "z_backbone", "z_mechanical"]
+HOMOGENEITY_STRAIN = 0.1
 ENDINGS = (".pdf", ".png", ".svg", ".eps", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 
 
@@ -38,7 +39,7 @@ def plot(
     z_definition: Annotated[Definition, typer.Option(help="Which z.")] = "z_backbone",
     force: Annotated[bool, typer.Option("--force", help="Replace FILE if it exists.")] = False,
 ) -> None:
-    """Draw a run: its (z, a) path, series, Mohr circle, rose of contacts or contact network."""
+    """Draw a run: its (z, a) path, series, Mohr circle, rose, network or strain map."""
     from granufab.io import read
 
     _check_output(output, force)
@@ -92,9 +93,11 @@ def _draw_states(
         if not -count <= frame < count:
             raise InvalidSettings(f"--frame {frame}: {name} holds frames 0..{count - 1}")
         packings[name] = run.frames[frame].packing
+    if figure in ("network", "homogeneity") and len(packings) > 1:
+        raise InvalidSettings(f"--figure {figure} draws one run, got {len(packings)}")
+    if figure == "homogeneity":
+        return _draw_homogeneity(*runs.values(), frame)
     if figure == "network":
-        if len(packings) > 1:
-            raise InvalidSettings(f"--figure network draws one run, got {len(packings)}")
         return plots.network(*packings.values(), criterion=criterion)
     networks = {
         name: fabric.select_network(packing, criterion=criterion, z_definition=z_definition)
@@ -111,3 +114,17 @@ def _draw_states(
         circles[name] = states.mohr(item.z, a, dimension=packings[name].dimension)
     domain = _domain(list(runs.values()), z_definition)
     return plots.mohr(circles, domain=domain)
+
+
+def _draw_homogeneity(run: Run, frame: int) -> Axes:
+    """Local strain over the last 0.1 of ε_q before the frame."""
+    from granufab import fabric, plots
+    from granufab.history import frame_before
+
+    before = frame_before(run.frames, frame, HOMOGENEITY_STRAIN)
+    if before is None:
+        raise InvalidSettings(
+            f"--figure homogeneity needs {HOMOGENEITY_STRAIN} of ε_q in one stage before the "
+            "frame; choose a later --frame"
+        )
+    return plots.homogeneity(fabric.local_strain(before.packing, run.frames[frame].packing))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from granufab.fabric import homogeneity
-from granufab.history import Frame, StepStatistics
+from granufab.history import Frame, StepStatistics, frame_before
 from granufab.simulate.capture import merge
 from granufab.simulate.stepping import Simulation
 
@@ -72,12 +72,10 @@ def _add_homogeneity(summary: dict[str, Any], frames: Sequence[Frame]) -> None:
     """Variance of the local strain over the last part of the path; warns of shear bands."""
     if not frames or frames[-1].packing.grains.count < HOMOGENEITY_GRAINS:
         return
-    end = frames[-1]
-    earliest = end.eps_q_total - HOMOGENEITY_STRAIN
-    before = [f for f in frames if f.stage == end.stage and f.eps_q_total <= earliest]
-    if not before:
+    before = frame_before(frames, -1, HOMOGENEITY_STRAIN)
+    if before is None:
         return
-    found = homogeneity((before[-1].packing, end.packing))
+    found = homogeneity((before.packing, frames[-1].packing))
     summary["homogeneity"] = dict(found)
     if found["localised"]:
         summary["warnings"].append(
