@@ -82,21 +82,15 @@ def _cpu() -> dict[str, Any]:
 
 def _compile_cache() -> dict[str, Any]:
     """Where numba keeps compiled kernels, and what lies there."""
-    from numba.core import config
+    from granufab.kernels.options import cache_folder
 
-    import granufab
-
-    wanted = vars(config)["CACHE_DIR"]
-    folder = Path(wanted) if wanted else Path(granufab.__file__).parent
-    compiled = list(folder.rglob("*.nbc"))
-    sources = Path(granufab.__file__).parent.glob("kernels/*.py")
-    newest = max(path.stat().st_mtime for path in sources)
+    folder = Path(cache_folder())
+    compiled = list(folder.rglob("*.nbc")) if folder.is_dir() else []
     return {
-        "folder": str(folder if wanted else folder / "*" / "__pycache__"),
-        "set_by": "NUMBA_CACHE_DIR" if wanted else "default",
+        "folder": str(folder),
+        "set_by": "NUMBA_CACHE_DIR" if os.environ.get("NUMBA_CACHE_DIR") else "default",
         "writable": os.access(_existing(folder), os.W_OK),
         "compiled": len(compiled),
-        "older_than_the_kernels": sum(path.stat().st_mtime < newest for path in compiled),
         "megabytes": sum(path.stat().st_size for path in compiled) / 1e6,
     }
 

@@ -15,18 +15,22 @@ from typing import Any, TypeVar
 from numba import njit
 from numba.core import config
 
-__all__ = ["ARITHMETIC", "kernel"]
+__all__ = ["ARITHMETIC", "cache_folder", "kernel"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 ARITHMETIC: dict[str, Any] = {"fastmath": {"contract", "nsz", "nnan"}, "error_model": "numpy"}
 
 
-def _cache_folder() -> str:
-    """Where compiled kernels lie: a user cache folder named by a hash of the kernels' text.
+def cache_folder() -> str:
+    """Where compiled kernels lie: NUMBA_CACHE_DIR, or a user cache folder of this version.
+
+    The folder's name holds a hash of the kernels' text.
 
     Numba notices a change only in the file that holds a function, not in those it inlines, so
     a new version of the package must never meet kernels compiled from an older one.
     """
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return os.environ["NUMBA_CACHE_DIR"]
     home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
     base = Path(home) if home else Path.home() / ".cache"
     text = hashlib.sha256()
@@ -35,8 +39,7 @@ def _cache_folder() -> str:
     return str(base / "granufab" / f"kernels-{text.hexdigest()[:16]}")
 
 
-if not config.CACHE_DIR:  # type: ignore[attr-defined]
-    config.CACHE_DIR = _cache_folder()  # type: ignore[attr-defined]
+config.CACHE_DIR = cache_folder()  # type: ignore[attr-defined]
 
 
 def kernel(function: F) -> F:
