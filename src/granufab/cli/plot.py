@@ -96,7 +96,7 @@ def _draw_states(
     if figure in ("network", "homogeneity") and len(packings) > 1:
         raise InvalidSettings(f"--figure {figure} draws one run, got {len(packings)}")
     if figure == "homogeneity":
-        return _draw_homogeneity(*runs.values(), frame)
+        return _draw_homogeneity(next(iter(runs.values())), frame)
     if figure == "network":
         return plots.network(*packings.values(), criterion=criterion)
     networks = {

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -36,7 +37,12 @@ def cache_folder() -> str:
     text = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*.py")):
         text.update(path.read_bytes())
-    return str(base / "granufab" / f"kernels-{text.hexdigest()[:16]}")
+    name = f"kernels-{text.hexdigest()[:16]}"
+    try:
+        (base / "granufab" / name).mkdir(parents=True, exist_ok=True)
+    except OSError:  # no home to write in: the kernels are then compiled once per machine start
+        return str(Path(tempfile.gettempdir()) / "granufab" / name)
+    return str(base / "granufab" / name)
 
 
 config.CACHE_DIR = cache_folder()  # type: ignore[attr-defined]
