@@ -15,7 +15,7 @@ slow:
 	$(PYTHON) -m pytest -m slow
 
 bench:
-	@for script in benchmarks/*.py; do echo "$$script"; $(PYTHON) "$$script" || exit 1; done
+	$(PYTHON) benchmarks/timing.py --full
 
 docs:
 	$(PYTHON) docs/write_api.py

@@ -153,7 +153,8 @@ def run_groups(out: Path, groups: list[str], grains: int, workers: int, samples:
         for done in as_completed(jobs):
             m = means(done.result())
             print(
-                time.strftime("%H:%M:%S"), jobs[done],
+                time.strftime("%H:%M:%S"),
+                jobs[done],
                 f"zb {m['z_backbone']:.3f} z {m['z']:.3f} a {m['a_signed']:.3f} "
                 f"q/p {m['q_over_p']:.4f} ov {m['overlap']:.1e} unconv {m['unconverged']:.4f} "
                 f"sweeps {m['sweeps']:.0f} s {m['seconds']:.0f}",

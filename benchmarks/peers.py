@@ -93,7 +93,8 @@ def main() -> None:
         for done in as_completed(jobs):
             m = done.result()
             print(
-                time.strftime("%H:%M:%S"), jobs[done],
+                time.strftime("%H:%M:%S"),
+                jobs[done],
                 f"z {m['z']:.3f} ({m['z_backbone']:.3f}) rattlers {m['rattler_fraction']:.3f} "
                 f"a {m['a']:.3f} q/p {m['q_over_p']:.3f} sweeps {m['sweeps']:.0f} "
                 f"unconverged {m['unconverged']:.4f} {m['seconds']:.0f} s",
