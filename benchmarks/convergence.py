@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 INF = math.inf
-SAMPLES = (("dense", 3.7, 1), ("dense", 3.7, 2), ("loose", 3.15, 1), ("loose", 3.15, 2))
+SAMPLES = (("dense", 3.7, 1), ("loose", 3.15, 1), ("dense", 3.7, 2), ("loose", 3.15, 2))
 COLUMNS = ("eps_q", "z", "z_backbone", "rattler_fraction", "a_signed", "q_over_p", "phi", "overlap")
 
 
@@ -42,12 +42,14 @@ GROUPS: dict[str, list[dict[str, float]]] = {
     "slow-rigid": [job(r, INF, 1e-4, 2e-5) for r in (1e-2, 1e-3, 1e-4)],
     # inertial number and strain per step at fixed residual
     "rate": [
-        job(1e-4, 5e4, 1e-2, 1e-4),
-        job(1e-4, 5e4, 3e-3, 1e-4),
-        job(1e-4, 5e4, 1e-3, 5e-5),
-        job(1e-4, 5e4, 3e-4, 2e-5),
+        job(1e-4, 1.6e5, 1e-2, 1e-4),
+        job(1e-4, 1.6e5, 3e-3, 1e-4),
+        job(1e-4, 1.6e5, 1e-3, 5e-5),
+        job(1e-4, 1.6e5, 3e-4, 1.5e-5),
+        job(1e-4, 1.6e5, 1e-4, 5e-6),
     ],
-    "step": [job(1e-4, 5e4, 1e-3, s) for s in (4e-4, 2e-4, 1e-4, 5e-5, 2e-5)],
+    "rate-slowest": [job(1e-4, 1.6e5, 3e-5, 5e-6)],
+    "step": [job(1e-4, 1.6e5, 1e-3, s) for s in (4e-4, 2e-4, 1e-4, 5e-5, 2e-5)],
 }
 
 

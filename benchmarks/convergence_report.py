@@ -163,9 +163,9 @@ def main() -> None:
         "rigid, I = 10⁻⁴": at(math.inf, 1e-4, 2e-5),
     }
     draw(table, 0, slow, "residual [-]", images / "convergence-slow")
-    one = {"k/p = 5·10⁴": lambda k: k[1] == 5e4 and k[0] == CHOSEN and _rate_step(k)}
+    one = {"k/p = 1.6·10⁵": lambda k: k[1] == 1.6e5 and k[0] == CHOSEN and _rate_step(k)}
     draw(table, 2, one, r"inertial number $I$ [-]", images / "convergence-rate")
-    one = {"k/p = 5·10⁴, I = 10⁻³": lambda k: k[:3] == (CHOSEN, 5e4, 1e-3)}
+    one = {"k/p = 1.6·10⁵, I = 10⁻³": lambda k: k[:3] == (CHOSEN, 1.6e5, 1e-3)}
     draw(table, 3, one, r"$\varepsilon_q$ per step [-]", images / "convergence-step")
 
 
@@ -174,7 +174,7 @@ CHOSEN = 1e-4
 
 def _rate_step(key: Key) -> bool:
     """Settings of the rate axis: one step size per inertial number."""
-    step = {1e-2: 1e-4, 3e-3: 1e-4, 1e-3: 5e-5, 3e-4: 2e-5, 1e-4: 5e-6, 3e-5: 2e-6}
+    step = {1e-2: 1e-4, 3e-3: 1e-4, 1e-3: 5e-5, 3e-4: 1.5e-5, 1e-4: 5e-6, 3e-5: 5e-6}
     return math.isclose(step.get(key[2], -1.0), key[3])
 
 

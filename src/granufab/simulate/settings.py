@@ -114,7 +114,7 @@ class Solver(_Settings):
         default=2000, description="sweeps after which a step is counted as not converged"
     )
     stiffness: Annotated[float, Field(gt=0)] = Field(
-        default=5e4, description="implicit contact stiffness k/p (3D: k/(p d)); inf is rigid"
+        default=1.6e5, description="implicit contact stiffness k/p (3D: k/(p d)); inf is rigid"
     )
     momentum: bool = Field(
         default=True, description="accelerate the sweeps by safeguarded momentum"
