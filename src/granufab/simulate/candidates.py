@@ -47,10 +47,13 @@ class Candidates:
 
     def keys(self) -> IntArray:
         """One integer per (i, j, image)."""
+        return self._key(self.pairs, self.images)
+
+    def _key(self, pairs: np.ndarray, images: np.ndarray) -> IntArray:
         bodies = np.int64(self.grain_count + 2 * self.dimension)
-        key = self.pairs[:, 0].astype(np.int64) * bodies + self.pairs[:, 1]
+        key = pairs[:, 0].astype(np.int64) * bodies + pairs[:, 1]
         for k in range(self.dimension):
-            key = key * IMAGE_SPAN + (self.images[:, k] + IMAGE_SPAN // 2) % IMAGE_SPAN
+            key = key * IMAGE_SPAN + (images[:, k] + IMAGE_SPAN // 2) % IMAGE_SPAN
         return key
 
     def search(
@@ -100,15 +103,9 @@ class Candidates:
         self._recall(old_keys, old_n, old_t)
 
     def _recall(self, old_keys: IntArray, old_n: Array, old_t: Array) -> None:
-        if not len(old_keys) or not self.count:
-            return
-        order = np.argsort(old_keys, kind="stable")
-        keys = self.keys()
-        place = np.minimum(np.searchsorted(old_keys[order], keys), len(order) - 1)
-        source = order[place]
-        known = old_keys[source] == keys
-        self.impulse_n[known] = old_n[source[known]]
-        self.impulse_t[known] = old_t[source[known]]
+        source, known = _match(old_keys, self.keys())
+        self.impulse_n[known] = old_n[source]
+        self.impulse_t[known] = old_t[source]
 
     def measure(
         self,
@@ -153,29 +150,57 @@ class Candidates:
         self.images[:, flow] += turns * self.images[:, axis]
 
     def seed_impulses(
-        self, contacts: Contacts | None, walls: WallContacts | None, step: float
+        self,
+        contacts: Contacts | None,
+        walls: WallContacts | None,
+        step: float,
+        remap: IntArray,
     ) -> None:
-        """Start from the forces of a packing: impulse = force · h."""
-        n = self.normal
+        """Start from the forces of a packing: impulse = force · h.
+
+        ``remap`` T (shape (D, D)) is the change of lattice basis since the packing was made,
+        C_now = C T; its images follow as T⁻¹·image.
+        """
         force = np.zeros((self.count, self.dimension))
-        lookup = {}
         if contacts is not None and contacts.force is not None:
             image = contacts.image
-            for c, (i, j) in enumerate(contacts.pair):
-                sign = 1.0 if i < j else -1.0
-                where = () if image is None else tuple(int(sign) * int(x) for x in image[c])
-                lookup[(min(i, j), max(i, j), where)] = sign * contacts.force[c]
-            for c, (i, j) in enumerate(self.pairs):
-                where = () if image is None else tuple(int(x) for x in self.images[c])
-                force[c] = lookup.get((i, j, where), 0.0)
+            if image is not None:
+                image = np.rint(image @ np.linalg.inv(remap).T).astype(np.int64)
+            self._seed_grains(force, contacts.pair, contacts.force, image)
         if walls is not None:
-            on_wall = {(g, w): f for g, w, f in zip(walls.grain, walls.wall, walls.force)}  # noqa: B905
-            for c in np.flatnonzero(self.pairs[:, 1] >= self.grain_count):
-                wall = int(self.pairs[c, 1]) - self.grain_count
-                force[c] = on_wall.get((int(self.pairs[c, 0]), wall), 0.0)
-        self.impulse_n[:] = np.maximum(np.einsum("ck,ck->c", force, n), 0.0) * step
+            pairs = np.stack([walls.grain, walls.wall + self.grain_count], axis=1)
+            self._seed(force, pairs, walls.force, np.zeros_like(walls.normal, dtype=np.int64))
+        n = self.normal
+        along = np.einsum("ck,ck->c", force, n)
+        self.impulse_n[:] = np.maximum(along, 0.0) * step
         if self.dimension == 2:
             self.impulse_t[:, 0] = (n[:, 0] * force[:, 1] - n[:, 1] * force[:, 0]) * step
         else:
-            normal_part = np.einsum("ck,ck->c", force, n)[:, None] * n
-            self.impulse_t[:] = (force - normal_part) * step
+            self.impulse_t[:] = (force - along[:, None] * n) * step
+
+    def _seed_grains(
+        self, force: Array, pair: IntArray, given: Array, image: IntArray | None
+    ) -> None:
+        """Forces of listed pairs, turned to i < j; without images by the pair alone."""
+        turned = pair[:, 0] > pair[:, 1]
+        sign = np.where(turned, -1, 1)[:, None]
+        pairs = np.where(turned[:, None], pair[:, ::-1], pair)
+        images = None if image is None else image * sign
+        self._seed(force, pairs, given * sign, images)
+
+    def _seed(self, force: Array, pairs: IntArray, given: Array, images: IntArray | None) -> None:
+        here = self.images if images is not None else np.zeros_like(self.images)
+        there = images if images is not None else np.zeros((len(pairs), self.dimension), int)
+        source, known = _match(self._key(pairs, there), self._key(self.pairs, here))
+        force[known] = given[source]
+
+
+def _match(old: IntArray, new: IntArray) -> tuple[IntArray, IntArray]:
+    """Indices (into ``old``, into ``new``) of the keys that both hold."""
+    if not len(old) or not len(new):
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    order = np.argsort(old, kind="stable")
+    place = np.minimum(np.searchsorted(old[order], new), len(order) - 1)
+    source = order[place]
+    known = np.flatnonzero(old[source] == new)
+    return source[known], known

@@ -120,7 +120,9 @@ class Simulation:
         self.set_loading(loading, step=step)
         self._search()
         self._measure_gaps()
-        self.candidates.seed_impulses(packing.contacts, packing.wall_contacts, self.step_size)
+        self.candidates.seed_impulses(
+            packing.contacts, packing.wall_contacts, self.step_size, self.remap
+        )
 
     def set_loading(self, loading: Loading, *, step: float | None = None) -> None:
         """Change what drives the cell; impulses are rescaled to the new time step."""
