@@ -101,6 +101,18 @@ def test_without_restitution_a_falling_ball_lands_and_stays():
     assert simulation.position[0, 1] == pytest.approx(0.5, abs=1e-14)
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_a_ball_that_leaves_the_floor_is_left_alone(friction):
+    """Within reach of the floor, but parting: solved before the first sweep."""
+    leaving = grains([[50.0, 0.5005]], velocity=[[0.0, 0.5]])
+    simulation = simulate(on_floor(leaving), material=Material(wall_friction=friction), step=1e-3)
+    report = simulation.step()
+    assert report.contacts == 1
+    assert report.converged
+    assert report.sweeps == 0
+    assert velocity(simulation)[0].tolist() == [0.0, 0.5]
+
+
 # --- an inclined plane ------------------------------------------------------------------------
 
 
