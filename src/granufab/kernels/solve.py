@@ -5,7 +5,8 @@ cap). When the step norm ‖x_{k+1} − y_k‖ grows by more than 1.02 the momen
 grows by 1.3; after 15 sweeps without a restart 1 − cap shrinks by 1.3 again. Velocities are
 affine in the impulses, so both are extrapolated alike. The residual is taken only on an
 unextrapolated iterate, when the step norm promises that it is met, and at least every ``CHECK``
-sweeps.
+sweeps. Where five checks bring no progress another cap is tried: on rare steps momentum circles
+around the solution while plain sweeps converge, on others it is the other way round.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ CHECK = 40
 GROWTH = 1.02
 CAUTION = 1.3
 RECOVERY = 15
+PROGRESS, PATIENCE = 0.9, 5
 
 
 @kernel
@@ -64,6 +66,14 @@ def impulse_norm(state: State):
 
 
 @kernel
+def next_cap(cap, first):
+    """Caps to try in turn where the residual stalls: halves, then none, then the first again."""
+    if cap > 0.2:
+        return 0.5 * cap
+    return 0.0 if cap > 0.0 else first
+
+
+@kernel
 def solve(problem: Problem, state: State, before: State, like, settings):
     """Sweep until the residual is met or the sweeps run out.
 
@@ -81,6 +91,7 @@ def solve(problem: Problem, state: State, before: State, like, settings):
     sweeps = 0
     since_check, momentum_age, last_step = 0, 0, np.inf
     highest, calm = cap, 0
+    best, stale = np.inf, 0
     ratio = 1.0
     remember(state, before)
     while found[0] > tolerance and sweeps < max_sweeps:
@@ -94,7 +105,14 @@ def solve(problem: Problem, state: State, before: State, like, settings):
             ratio = max(0.2, 0.9 * found[0] / max(relative, 1e-300))
             if found[0] <= tolerance:
                 break
-        if highest > 0.0 and sweeps < max_sweeps:
+            stale += 1
+            if found[0] < PROGRESS * best:
+                best, stale = found[0], 0
+            if stale == PATIENCE:
+                stale = 0
+                highest = next_cap(highest, settings[2])
+                cap, calm, momentum_age = highest, 0, 0
+        if settings[2] > 0.0 and sweeps < max_sweeps:
             if step > GROWTH * last_step:
                 momentum_age = 0
                 cap = max(0.0, 1.0 - CAUTION * (1.0 - cap))
