@@ -83,6 +83,28 @@ def test_other_verbs_read_what_run_left(granufab, folder: Path) -> None:
     assert found["z_star"]["value"] == pytest.approx(again["z_star"]["value"], rel=1e-6)
 
 
+def test_a_case_starts_from_the_last_frame_of_a_run_file(
+    granufab, folder: Path, tmp_path: Path
+) -> None:
+    case = tmp_path / "next.toml"
+    case.write_text(CASE, encoding="utf-8")
+    arguments = ["run", case, "--set", "path.0.strain=0.002", "--set", "sample.grain_count=99"]
+    arguments += ["--set", f'sample.file="{(folder / "run.h5").as_posix()}"', "--out"]
+    assert granufab(*arguments, tmp_path / "out").code == 0
+    before = json.loads(granufab("measure", folder / "run.h5", "--json").out)[-1]
+    after = json.loads(granufab("measure", tmp_path / "out" / "run.h5", "--json").out)[0]
+    for name in ("grain_count", "phi", "z_backbone", "p"):
+        assert after[name] == pytest.approx(before[name], rel=1e-4)
+    assert after["a_signed"] == pytest.approx(before["a_signed"], abs=1e-3)
+    assert load_case(tmp_path / "out" / "settings.toml").sample.grain_count == 40
+    refused = granufab(*arguments, folder, "--force")
+    assert refused.code == 2
+    assert (folder / "run.h5").exists()
+    gone = granufab(*arguments, tmp_path / "out2", "--set", "sample.file=none.h5")
+    assert gone.code == 2
+    assert "none.h5" in gone.err
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_a_run_with_code_3(granufab, tmp_path: Path, number: signal.Signals) -> None:
