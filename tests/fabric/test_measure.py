@@ -254,6 +254,16 @@ def test_a_run_brings_its_own_criterion():
         measure_run(path_of([]))
 
 
+def test_a_gap_beyond_what_the_run_recorded_finds_its_own_pairs():
+    short = forced()
+    assert short.contacts is not None and short.contacts.gap is not None
+    listed = short.contacts.select(short.contacts.gap < 0.02)
+    run = path_of([replace(short, contacts=listed)])
+    settings = {"record": {"reach": 0.3}, "solver": {"skin": 0.02}}
+    data = measure_run(replace(run, settings=settings), criterion="gap:0.25", z_definition="z")
+    assert float(data.z[0]) == measure(short, criterion="gap:0.25", z_definition="z")["z"]
+
+
 def test_a_wider_criterion_counts_more():
     data = criterion_sweep(forced(), ("gap:0.0", "gap:0.05", "gap:0.1"), z_definition="z")
     assert (np.diff(data.z) > 0).all()

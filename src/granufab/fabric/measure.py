@@ -165,7 +165,7 @@ def measure_run(
             z_definition=definition,
             direction=frame.direction if direction is None else direction,
             minimum=minimum,
-            reach=record.get("reach"),
+            reach=_recorded_reach(run),
             bootstrap=bootstrap,
         )
         rows.append(row | _frame_values(frame))
@@ -177,6 +177,15 @@ def measure_run(
         "dimension": run.dimension,
     }
     return _dataset(rows, "frame", attributes)
+
+
+def _recorded_reach(run: Run) -> float | None:
+    """Gap up to which a run lists every pair [mean diameters]: no more than its search margin."""
+    sections = (run.settings.get(name, {}) for name in ("record", "solver"))
+    record, solver = (s if isinstance(s, Mapping) else {} for s in sections)
+    if record.get("reach") is None:
+        return None
+    return min(float(record["reach"]), float(solver.get("skin", math.inf)))
 
 
 def criterion_sweep(
