@@ -55,7 +55,7 @@ def _fabric_pairs(case: Case, result: Run) -> list[tuple[str, Any]]:
     from granufab.cli.fit import fit_series
 
     pairs: list[tuple[str, Any]] = [
-        ("contact criterion", case.record.criterion),
+        ("contact criterion", result.series.attrs.get("criterion", "force")),
         ("z is", case.record.z_definition),
         ("z_0", result.summary.get("z_0")),
     ]
