@@ -264,6 +264,17 @@ def test_a_gap_beyond_what_the_run_recorded_finds_its_own_pairs():
     assert float(data.z[0]) == measure(short, criterion="gap:0.25", z_definition="z")["z"]
 
 
+@pytest.mark.parametrize(("friction", "fewest"), [(0.0, 3), (0.4, 2)])
+def test_a_run_without_friction_keeps_the_rattler_rule_of_its_series(friction, fewest):
+    packing = forced(bearing=0.5)
+    run = replace(path_of([packing]), settings={"material": {"friction": friction}})
+    found = measure_run(run, criterion="force")
+    wanted = measure(packing, criterion="force", minimum=fewest)
+    assert wanted["z_backbone"] != measure(packing, minimum=5 - fewest)["z_backbone"]
+    assert float(found.z_backbone[0]) == wanted["z_backbone"]
+    assert found.attrs["minimum_contacts"] == fewest
+
+
 def test_a_wider_criterion_counts_more():
     data = criterion_sweep(forced(), ("gap:0.0", "gap:0.05", "gap:0.1"), z_definition="z")
     assert (np.diff(data.z) > 0).all()

@@ -20,6 +20,7 @@ from granufab.fabric.coordination import (
 from granufab.fabric.criterion import Criterion, force_threshold, mean_diameter, parse_criterion
 from granufab.fabric.neighbours import branch_vectors, neighbours_within
 from granufab.fabric.network import Network, select_network
+from granufab.fabric.rattlers import minimum_contacts
 from granufab.fabric.stress import solid_fraction, stress_ratio, stress_tensor
 from granufab.fabric.tensors import (
     anisotropy,
@@ -131,7 +132,7 @@ def measure_run(
     criterion: str | Criterion | None = None,
     z_definition: ZDefinition | None = None,
     direction: Array | None = None,
-    minimum: int = 2,
+    minimum: int | None = None,
     bootstrap: int = 0,
 ) -> xr.Dataset:
     """All values of :func:`measure` for every recorded frame of a run.
@@ -141,7 +142,8 @@ def measure_run(
         criterion: default the run's own, else ``force``.
         z_definition: default the run's own, else ``z_backbone``.
         direction: axis of a', shape (D,); default each frame's contraction axis.
-        minimum: fewest contacts that hold a grain.
+        minimum: fewest contacts that hold a grain; default the run's own rule, D + 1 where its
+            grains have no friction, else 2.
         bootstrap: number of resampled states a frame for standard errors.
     Returns:
         Variables over ``frame``, NaN where unknown, with eps_q, eps_q_total, stage, residual,
@@ -156,6 +158,10 @@ def measure_run(
     record = record if isinstance(record, Mapping) else {}
     rule = parse_criterion(criterion or record.get("criterion", "force"))
     definition = check_definition(z_definition or record.get("z_definition", "z_backbone"))
+    if minimum is None:
+        material = run.settings.get("material", {})
+        smooth = isinstance(material, Mapping) and material.get("friction") == 0
+        minimum = minimum_contacts("frictionless" if smooth else "frictional", run.dimension)
     rows = []
     for index in range(len(run.frames)):
         frame = run.frames[index]
