@@ -69,6 +69,7 @@ def test_the_settings_are_the_resolved_ones(folder: Path) -> None:
 def test_the_summary_says_how_well_it_was_solved(folder: Path) -> None:
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["seed"] == 5
+    assert (summary["criterion"], summary["z_definition"]) == ("force", "z_backbone")
     assert summary["steps"] >= 200
     assert summary["nonconverged_steps"] <= 0.01 * summary["steps"]
     assert summary["overlap_max"] < 2e-3

@@ -106,7 +106,12 @@ def _simulator() -> RunCase:
 def _summary(case: Case, run: Run) -> dict[str, Any]:
     import granufab
 
-    return {"granufab": granufab.__version__, "name": case.name, **run.summary}
+    return {
+        "granufab": granufab.__version__,
+        "name": case.name,
+        "z_definition": case.record.z_definition,
+        **run.summary,
+    }
 
 
 def check_writable(folder: Path) -> None:
