@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from granufab.kernels.contact_law import cone_defect, separate_law, slide_or_stick
@@ -110,6 +110,7 @@ def test_the_result_does_not_depend_on_the_impulse_it_starts_from(p_n, p_t, b_n,
 
 @EXAMPLES
 @given(impulses, numbers, numbers, numbers, positive, positive, frictions, positive)
+@example(0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 1.0)
 def test_the_defect_vanishes_at_solutions(p_n, p_t, u_n, u_t, w_n, w_t, mu, rho):
     new_n, (new_t,) = separate_law(p_n, (p_t,), u_n, (u_t,), w_n, w_t, mu)
     after_n, after_t = u_n + w_n * (new_n - p_n), u_t + w_t * (new_t - p_t)
