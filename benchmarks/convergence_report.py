@@ -1,15 +1,9 @@
-"""Tables and figures of the convergence study, from the jobs that ``convergence.py`` left.
-
-    python benchmarks/convergence_report.py OUT DOCS
-
-writes DOCS/convergence.json, DOCS/convergence-table.md and DOCS/images/convergence-*.{png,pdf}.
-"""
+"""Table and figures of the convergence study, from the jobs that ``convergence.py`` left."""
 
 from __future__ import annotations
 
 import json
 import math
-import sys
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -138,35 +132,32 @@ def draw(table: dict[Key, Any], axis: int, curves: dict[str, Any], label: str, s
     axes[3].set_yscale("log")
     axes[3].axhline(2e-3, color="0.6", linewidth=0.8, linestyle=":")
     axes[3].set_xlabel(label)
-    axes[0].legend(fontsize=7, frameon=False)
+    if axes[0].get_legend_handles_labels()[0]:
+        axes[0].legend(fontsize=7, frameon=False)
     save(figure, stem)
 
 
-def main() -> None:
-    """Command line."""
-    folder, docs = Path(sys.argv[1]), Path(sys.argv[2])
+def write(folder: Path, docs: Path) -> str:
+    """Numbers and figures into ``docs``; returns the table as Markdown."""
     table = load(folder)
     rows = rows_of(table)
-    (docs / "images").mkdir(parents=True, exist_ok=True)
-    (docs / "convergence.json").write_text(json.dumps(rows, indent=1))
-    (docs / "convergence-table.md").write_text(markdown(rows))
-    names = {1.6e4: "1.6·10⁴", 5e4: "5·10⁴", 1.6e5: "1.6·10⁵", math.inf: "rigid"}
     images = docs / "images"
+    images.mkdir(parents=True, exist_ok=True)
+    (docs / "convergence.json").write_text(json.dumps(rows, indent=1))
+    names = {1.6e4: "1.6·10⁴", 5e4: "5·10⁴", 1.6e5: "1.6·10⁵", math.inf: "rigid"}
 
     def at(stiffness: float, inertial: float, step: float) -> Any:
         return lambda k: k[1:] == (stiffness, inertial, step)
 
-    residual = {f"k/p = {t}, I = 10⁻³": at(k, 1e-3, 5e-5) for k, t in names.items()}
+    residual = {f"$k/p$ = {t}": at(k, 1e-3, 5e-5) for k, t in names.items()}
     draw(table, 0, residual, "residual [-]", images / "convergence-residual")
-    slow = {
-        "k/p = 5·10⁴, I = 10⁻⁴": at(5e4, 1e-4, 5e-6),
-        "rigid, I = 10⁻⁴": at(math.inf, 1e-4, 2e-5),
-    }
+    slow = {"$k/p$ = 5·10⁴": at(5e4, 1e-4, 5e-6), "rigid": at(math.inf, 1e-4, 2e-5)}
     draw(table, 0, slow, "residual [-]", images / "convergence-slow")
-    one = {"k/p = 1.6·10⁵": lambda k: k[1] == 1.6e5 and k[0] == CHOSEN and _rate_step(k)}
+    one = {"$k/p$ = 1.6·10⁵": lambda k: k[1] == 1.6e5 and k[0] == CHOSEN and _rate_step(k)}
     draw(table, 2, one, r"inertial number $I$ [-]", images / "convergence-rate")
-    one = {"k/p = 1.6·10⁵, I = 10⁻³": lambda k: k[:3] == (CHOSEN, 1.6e5, 1e-3)}
+    one = {"$k/p$ = 1.6·10⁵, $I$ = 10⁻³": lambda k: k[:3] == (CHOSEN, 1.6e5, 1e-3)}
     draw(table, 3, one, r"$\varepsilon_q$ per step [-]", images / "convergence-step")
+    return markdown(rows).rstrip()
 
 
 CHOSEN = 1e-4
@@ -176,7 +167,3 @@ def _rate_step(key: Key) -> bool:
     """Settings of the rate axis: one step size per inertial number."""
     step = {1e-2: 1e-4, 3e-3: 1e-4, 1e-3: 5e-5, 3e-4: 1.5e-5, 1e-4: 5e-6, 3e-5: 5e-6}
     return math.isclose(step.get(key[2], -1.0), key[3])
-
-
-if __name__ == "__main__":
-    main()

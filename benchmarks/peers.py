@@ -26,8 +26,7 @@ JOBS: dict[str, tuple[int, float, float, float, float, int]] = {
     for n, k, i, tolerance, step in (
         (1000, 1e4, 1e-4, 1e-5, 1e-5),
         (1000, 1e5, 1e-4, 1e-5, 1e-5),
-        (1000, 5e4, 1e-4, 1e-5, 1e-5),
-        (1000, math.inf, 1e-4, 1e-5, 4e-5),
+        (1000, math.inf, 1e-4, 1e-4, 1e-5),
         (2000, 1e3, 1e-3, 1e-5, 1e-4),
         (2000, 1e4, 1e-3, 1e-5, 1e-4),
         (2000, 5e4, 1e-3, 1e-5, 1e-4),

@@ -36,7 +36,7 @@ SERIES_UNITS: dict[str, tuple[str, str]] = {
     "a": ("-", "fabric anisotropy"),
     "a_signed": ("-", "signed fabric anisotropy"),
     "theta_c": ("degree", "major direction of the fabric"),
-    "q_over_p": ("-", "stress ratio"),
+    "q_over_p": ("-", "stress ratio, from the principal stresses, unsigned"),
     "phi": ("-", "solid fraction"),
     "p": ("stress", "mean stress"),
     "residual": ("-", "largest solver residual since the last row"),

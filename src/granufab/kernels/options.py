@@ -1,7 +1,7 @@
 """How every kernel is compiled.
 
 ``contract`` lets LLVM fuse multiply–add, ``nsz`` and ``nnan`` free the branch-free minimum and
-maximum; so no kernel may rely on NaN: states are checked for it outside (``state_check``).
+maximum; so no kernel may rely on NaN: states are checked for it outside (``simulate.stepping``).
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ def select_active(pairs, gap, impulse_n, motion, limits, active, like):
 
     Args:
         limits: (margin, h, |L|, touching): a pair is marked if its gap is below
-            margin + h(|c_i| + |c_j| + |L|·touch distance); margin < 0 marks only pairs with
+            margin + h(|c_i| + |c_j| + |L|·|gap|); margin < 0 marks only pairs with
             gap ≤ touching (restitution: contacts act only when closed).
     """
     margin, step, rate, touching = limits

@@ -100,12 +100,14 @@ def solve(problem: Problem, state: State, before: State, like, settings):
         since_check += 1
         relative = step / max(impulse_norm(state), floor)
         if relative * ratio < tolerance or since_check >= CHECK or sweeps == max_sweeps:
+            due = since_check >= CHECK
             since_check = 0
             found = residual(problem, state, like, floor)
             ratio = max(0.2, 0.9 * found[0] / max(relative, 1e-300))
             if found[0] <= tolerance:
                 break
-            stale += 1
+            if due:
+                stale += 1
             if found[0] < PROGRESS * best:
                 best, stale = found[0], 0
             if stale == PATIENCE:

@@ -46,12 +46,10 @@ def sweep(problem: Problem, state: State, like, lag):
     pending_dilation = 0.0
     eps, kappa = problem.softness, problem.spin_factor
     w_cell = problem.dilation_weight
-    moved = 0.0
-    until = lag
+    moved, until = 0.0, lag
     for c in range(len(problem.length)):
         i, j = problem.first[c], problem.second[c]
-        n = load(problem.normal, c, like)
-        length = problem.length[c]
+        n, length = load(problem.normal, c, like), problem.length[c]
         s_i, s_j = spin(motion, i, like), spin(motion, j, like)
         m_i, m_j = inverse_mass(motion, i, like), inverse_mass(motion, j, like)
         v_i, v_j = load(motion, i, like), load(motion, j, like)

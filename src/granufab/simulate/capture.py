@@ -100,7 +100,7 @@ def _wall_support(simulation: Simulation, on_wall: np.ndarray) -> IntArray | Non
 
 
 class StepTally:
-    """Gathers step reports between two records, and over the whole run."""
+    """Gathers step reports between two records."""
 
     def __init__(self) -> None:
         self._start()

@@ -70,6 +70,16 @@ class Loading:
         d, e = self.direction, self.extension
         return float(e @ self.rate @ e - d @ self.rate @ d)
 
+    @property
+    def nominal_rate(self) -> float:
+        """ε̇_q that the loading aims at [1/s]: the imposed one; where the extension is
+        stress-driven (biaxial, triaxial), the one without volume change, D/(D−1) of the axial.
+        """
+        free = self.free.astype(float)
+        if self.extension @ free @ self.extension == 1.0:
+            return self.deviatoric_rate * self.dimension / (self.dimension - 1)
+        return self.deviatoric_rate
+
     def reversed(self) -> Loading:
         """The same loading with the opposite imposed rates; ε_q keeps its sign convention."""
         return Loading(

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from granufab.errors import InvalidSettings
 from granufab.history import Frame, Recorder, Run, StepStatistics, series_dataset
-from granufab.packing import Packing
+from granufab.packing import Array, Packing
 from granufab.simulate.capture import StepTally, capture_frame, merge, series_row
 from granufab.simulate.loading import Loading, loading_of_stage
 from granufab.simulate.preparation import Prepared, prepare
@@ -83,6 +83,7 @@ class _Follower:
             "reach": min(settings.reach, simulation.solver.skin),
         }
         self.next_row = self.next_frame = 0.0
+        self.restless = False
         self._told = 0.0
 
     def start(self) -> None:
@@ -98,7 +99,7 @@ class _Follower:
         simulation = self.simulation
         simulation.set_loading(step.loading)
         simulation.remove_drift()
-        rate = abs(step.loading.deviatoric_rate)
+        rate = abs(step.loading.nominal_rate)
         self.place["stage"] = index
         self.place["inertial_number"] = rate * simulation.scales.inertial_time
         if step.strain is None or rate == 0:
@@ -108,9 +109,7 @@ class _Follower:
         goal = abs(step.strain)
         walked = 0.0
         while walked < goal * (1 - 1e-9):
-            before = self.place["eps_q"]
-            self._advance()
-            walked += abs(self.place["eps_q"] - before)
+            walked += self._advance()
             self._record(last=walked >= goal * (1 - 1e-9))
             self._tell(f"stage {index + 1}: strain", (done + walked) / total)
 
@@ -120,19 +119,23 @@ class _Follower:
             self._advance()
             if self.simulation.kinetic_ratio() < REST_ENERGY:
                 break
+        else:
+            self.restless = True
         self.simulation.damping = 0.0
         self._record(last=True)
 
-    def _advance(self) -> None:
+    def _advance(self) -> float:
+        """One step; returns the strain walked in the sense of the stage's own loading."""
         simulation = self.simulation
         before = simulation.strain.copy()
         report = simulation.step()
         change = simulation.strain - before
-        d, e = self.place["direction"], self.place["extension"]
-        moved = float(d @ change @ d - e @ change @ e)
-        self.place["eps_q"] += moved
-        self.place["eps_q_total"] += abs(moved)
+        self.place["eps_q"] += _shear_of(change, self.place["direction"], self.place["extension"])
+        own = simulation.loading
+        walked = _shear_of(change, own.direction, own.extension)
+        self.place["eps_q_total"] += abs(walked)
         self.tally.add(report, simulation.stress_error())
+        return walked if own.deviatoric_rate >= 0 else -walked
 
     def _record(self, *, last: bool) -> None:
         total = self.place["eps_q_total"] * (1 + 1e-9) + 1e-12
@@ -166,6 +169,11 @@ class _Follower:
             self.progress(f"{text} {self.place['eps_q']:.3f}", min(fraction, 1.0))
 
 
+def _shear_of(strain: Array, direction: Array, extension: Array) -> float:
+    """Deviatoric part of a strain along two axes, contraction positive."""
+    return float(direction @ strain @ direction - extension @ strain @ extension)
+
+
 def run(
     packing: Packing,
     path: Sequence[Step],
@@ -184,11 +192,12 @@ def run(
 
     Args:
         packing: starting state with masses and a cell.
-        path: stages; the first one's direction fixes the sign of ε_q and a'.
+        path: stages; the first one that shears fixes the axes of ε_q and a' for the whole
+            path, while each stage walks its strain along its own axes.
         material: friction, restitution.
         solver: tolerances and step sizes.
         record: receives frames and series rows as they come (a run-file writer, or your own
-            object with ``frame`` and ``row``); frames are then not kept in memory twice.
+            object with ``frame`` and ``row``); the returned run keeps them in memory as well.
         record_settings: how often.
         progress: called with a text and the fraction done.
         name: of the path.
@@ -203,8 +212,8 @@ def run(
     record_settings = record_settings or Record()
     memory = _Memory()
     began = time.perf_counter()
-    first = path[0].loading
-    simulation = Simulation(packing, first, material=material, solver=solver)
+    first = next((s.loading for s in path if s.loading.deviatoric_rate), path[0].loading)
+    simulation = Simulation(packing, path[0].loading, material=material, solver=solver)
     recorders = [memory] if record is None else [memory, record]
     follower = _Follower(
         simulation, recorders, record_settings, name, progress, first.direction, first.extension
@@ -222,6 +231,11 @@ def run(
     seconds = time.perf_counter() - began
     summary = summarise(simulation, follower.all, memory.frames, seconds)
     summary["interrupted"] = interrupted
+    if follower.restless:
+        summary["warnings"].append(
+            f"an isotropic stage did not come to rest: kinetic energy / pV is "
+            f"{summary['kinetic_ratio']:.1e}"
+        )
     attributes = {
         "criterion": "force",
         "z_definition": record_settings.z_definition,
@@ -290,14 +304,14 @@ def run_case(
         name=case.name,
         settings=case.model_dump(mode="json"),
     )
-    result.summary.update(_sample_summary(prepared, preparation))  # type: ignore[attr-defined]
-    result.summary["seed"] = case.sample.seed  # type: ignore[index]
-    return result
+    summary = {**result.summary, **_sample_summary(prepared, preparation)}
+    summary["seed"] = case.sample.seed if isinstance(prepared, Prepared) else None
+    return replace(result, summary=summary)
 
 
 def _sample_summary(prepared: Prepared | Packing, seconds: float) -> dict[str, Any]:
     if isinstance(prepared, Packing):
-        return {"preparation_seconds": seconds}
+        return {"preparation_seconds": seconds, "source": prepared.source}
     return {
         "preparation_seconds": seconds,
         "compaction_friction": prepared.friction,

@@ -207,6 +207,11 @@ def prepare(sample: Sample, *, progress: Progress | None = None) -> Prepared:
     Raises:
         NotConverged: the wanted coordination cannot be reached; names the reachable range.
     """
+    if sample.file is not None:
+        raise InvalidSettings(
+            "sample.file is read by `granufab run`; in Python start from "
+            "granufab.read(file).frames[-1].packing"
+        )
     start = random_sample(
         sample.grain_count,
         dimension=sample.dimension,

@@ -16,6 +16,7 @@ from granufab.simulate.settings import Sizes
 __all__ = ["draw_radii", "grain_mass", "random_sample"]
 
 RANDOM_LIMIT = {2: 0.5, 3: 0.32}
+RANDOM_DEFAULT = {2: 0.45, 3: 0.3}
 
 
 def draw_radii(
@@ -99,7 +100,7 @@ def random_sample(
     sizes: Sizes | None = None,
     diameter: float = 1.0,
     density: float = 1.0,
-    solid_fraction: float = 0.45,
+    solid_fraction: float | None = None,
     boundary: str = "periodic",
     seed: int = 1,
 ) -> Packing:
@@ -111,11 +112,11 @@ def random_sample(
         sizes: distribution of diameters; default uniform ±20 %.
         diameter: mean diameter d [m].
         density: [kg/m²] in 2D, [kg/m³] in 3D.
-        solid_fraction: wanted φ, at most 0.5 (2D) or 0.32 (3D; larger values are cut there).
+        solid_fraction: wanted φ, at most 0.5 (2D) or 0.32 (3D); default 0.45 or 0.3.
         boundary: "periodic" or "walls".
         seed: of the random stream; the same seed gives the same bits.
     Raises:
-        InvalidSettings: grain_count is not positive, or the cell is too small for the grains.
+        InvalidSettings: grain_count is not positive, or the solid fraction is out of reach.
     """
     if grain_count < 1:
         raise InvalidSettings(f"grain_count is {grain_count}, must be at least 1")
@@ -125,7 +126,12 @@ def random_sample(
         grain_count, sizes, diameter=diameter, dimension=dimension, generator=generator
     )
     mass = grain_mass(radius, density, dimension)
-    fraction = min(solid_fraction, RANDOM_LIMIT[dimension])
+    fraction = RANDOM_DEFAULT[dimension] if solid_fraction is None else solid_fraction
+    if fraction > RANDOM_LIMIT[dimension]:
+        raise InvalidSettings(
+            f"solid_fraction is {fraction}, random placing in {dimension}D allows up to "
+            f"{RANDOM_LIMIT[dimension]}"
+        )
     edge = (float(mass.sum()) / density / fraction) ** (1 / dimension)
     edge = max(edge, 2.05 * float(radius.max()))
     largest_first = np.argsort(-radius, kind="stable")

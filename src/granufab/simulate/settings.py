@@ -12,7 +12,14 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from granufab.errors import InvalidSettings
 
@@ -79,13 +86,15 @@ class Sample(_Settings):
     coordination: Positive | None = Field(
         default=None, description="wanted z_0, reached by bisecting the compaction friction"
     )
-    coordination_tolerance: Positive = Field(default=0.03, description="accepted |z_0 - wanted|")
+    coordination_tolerance: Positive = Field(
+        default=0.03, description="accepted |z_0 - wanted|, 0.05 at worst"
+    )
     z_definition: ZDefinition = Field(default="z_backbone", description="which z is meant")
     friction: NonNegative = Field(
         default=0.0, description="compaction friction where no coordination is wanted"
     )
-    solid_fraction: Annotated[float, Field(gt=0, lt=0.7)] = Field(
-        default=0.45, description="of the dilute random start"
+    solid_fraction: Annotated[float, Field(gt=0, le=0.5)] | None = Field(
+        default=None, description="of the dilute random start; default 0.45 (2D), 0.3 (3D)"
     )
     boundary: Literal["periodic", "walls"] = Field(
         default="periodic", description="periodic or walls"
@@ -158,12 +167,22 @@ class Stage(_Settings):
         description="compression axis (constant-mean, biaxial), gradient axis (simple shear)",
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _rate_alone(cls, data: Any) -> Any:
+        """A given rate replaces the default inertial number."""
+        if isinstance(data, dict) and data.get("rate") is not None:
+            return {"inertial_number": None, **data}
+        return data
+
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         if not math.isfinite(self.strain):
             raise ValueError(f"strain must be finite, got {self.strain}")
         if self.inertial_number is None and self.rate is None:
             raise ValueError("give inertial_number or rate")
+        if self.inertial_number is not None and self.rate is not None:
+            raise ValueError("give inertial_number or rate, not both")
         return self
 
 
@@ -176,11 +195,20 @@ class Record(_Settings):
         default=0.05, description="pairs up to this gap are recorded, in mean diameters"
     )
     criterion: str = Field(
-        default="force", description="contact criterion: force, gap:DELTA or listed"
+        default="force",
+        description="of measure_run: force, gap:DELTA, listed; the series uses force",
     )
     z_definition: ZDefinition = Field(
         default="z_backbone", description="definition of z on figures"
     )
+
+    @field_validator("criterion")
+    @classmethod
+    def _known_criterion(cls, text: str) -> str:
+        from granufab.fabric.criterion import parse_criterion  # scipy: only where a case is made
+
+        parse_criterion(text)
+        return text
 
 
 class Case(_Settings):
@@ -191,11 +219,16 @@ class Case(_Settings):
     sample: Sample = Sample()
     material: Material = Material()
     solver: Solver = Solver()
-    path: tuple[Stage, ...] = (Stage(),)
+    path: Annotated[tuple[Stage, ...], Field(min_length=1)] = (Stage(),)
     record: Record = Record()
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        if self.record.reach > self.solver.skin:
+            raise ValueError(
+                f"record.reach is {self.record.reach}, allowed up to solver.skin = "
+                f"{self.solver.skin}"
+            )
         for index, stage in enumerate(self.path):
             if stage.axis >= self.sample.dimension:
                 raise ValueError(

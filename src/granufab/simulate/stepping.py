@@ -148,7 +148,7 @@ class Simulation:
     def default_step(self, loading: Loading) -> float:
         """h from ``time_step`` and ``step_strain`` of the solver settings [s]."""
         step = self.solver.time_step * self.scales.time
-        rate = abs(loading.deviatoric_rate)
+        rate = abs(loading.nominal_rate)
         return min(step, self.solver.step_strain / rate) if rate > 0 else step
 
     def step_size_limit(self, strain: float, rate: float) -> None:
@@ -172,8 +172,8 @@ class Simulation:
     def remove_drift(self) -> None:
         """Take the centre of mass's velocity out of a fully periodic system."""
         if self.periodic.all():
-            rows = self.motion[: self.grain_count, : self.dimension]
-            rows -= (self.mass @ rows) / self.mass.sum()
+            velocity = self.motion[: self.grain_count, : self.dimension]
+            velocity -= (self.mass @ velocity) / self.mass.sum()
 
     def step(self) -> StepReport:
         """Advance by ``step_size``.
@@ -192,11 +192,10 @@ class Simulation:
         self._select()
         self._free_velocities(rate_before)
         clock = self._tick("geometry", clock)
-        report = self._solve(rate_before)
+        report = self.last_report = self._solve(rate_before)
         clock = self._tick("solve", clock)
-        self._finish(rate_before)
+        self._finish()
         self._check(report)
-        self.last_report = report
         self._tick("rest", clock)
         return report
 
@@ -364,7 +363,7 @@ class Simulation:
         self.rate = self.loading.rate + self.state.rate
         self.candidates.keep_impulses(chosen, impulse_n, impulse_t)
 
-    def _finish(self, rate_before: Array) -> None:
+    def _finish(self) -> None:
         push = virial(self.problem, self.state.impulse_n, self.state.impulse_t, self.like)
         self.stress = push / (self.step_size * self.volume)
         if self.rate_cap is not None:

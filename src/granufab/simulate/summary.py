@@ -12,7 +12,7 @@ from granufab.simulate.stepping import Simulation
 
 __all__ = ["summarise"]
 
-QUASI_STATIC = 3e-3
+QUASI_STATIC, STRESS_ERROR = 3e-3, 1e-2
 HOMOGENEITY_STRAIN, HOMOGENEITY_GRAINS = 0.1, 200
 
 
@@ -62,6 +62,11 @@ def summarise(
         warnings.append(
             f"{whole.nonconverged} of {whole.steps} steps ended above the tolerance "
             f"{simulation.solver.tolerance:.1e}, worst residual {whole.residual:.1e}"
+        )
+    if whole.pressure_error > STRESS_ERROR:
+        warnings.append(
+            f"a step missed the wanted stress by {100 * whole.pressure_error:.1f} %, more than "
+            f"{100 * STRESS_ERROR:.0f} %"
         )
     summary["warnings"] = warnings
     _add_homogeneity(summary, frames)

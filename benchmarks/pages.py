@@ -1,0 +1,106 @@
+"""Write the measured tables into the documentation pages, between markers.
+
+python benchmarks/pages.py convergence|peers|critical OUT
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+BEGIN, END = "<!-- measured table: {name} -->", "<!-- end of {name} -->"
+
+# κ, axial rate, grains, z, z_backbone, a: LAMMPS, pair gran/hooke/history, same job, one seed
+LAMMPS = (
+    ("1e3", "1e-3", 2000, 3.14, 3.39, 0.261),
+    ("1e3", "1e-3", 5000, 3.15, 3.39, 0.246),
+    ("1e4", "1e-3", 2000, 2.89, 3.22, 0.311),
+    ("1e4", "1e-3", 5000, 2.89, 3.22, 0.288),
+    ("1e4", "1e-4", 1000, 2.94, 3.285, 0.294),
+    ("1e5", "1e-4", 1000, 2.81, 3.214, 0.299),
+)
+
+
+def insert(page: str, name: str, table: str) -> None:
+    """Replace the text between the markers ``name`` of a page."""
+    path = DOCS / page
+    text = path.read_text()
+    begin, end = BEGIN.format(name=name), END.format(name=name)
+    head, _, rest = text.partition(begin)
+    _, _, tail = rest.partition(end)
+    path.write_text(f"{head}{begin}\n{table}\n{end}{tail}")
+
+
+def peers(folder: Path) -> None:
+    """Our biaxial runs beside LAMMPS'."""
+    runs: dict[tuple[str, float, int], list[dict[str, Any]]] = {}
+    for path in sorted(folder.glob("N*.json")):
+        data = json.loads(path.read_text())
+        runs.setdefault((data["kappa"], data["axial_rate"], data["grains"]), []).append(data)
+    names = ("z", "z_backbone", "rattler_fraction", "a", "a_signed", "q_over_p")
+    rows = []
+    for (kappa, rate, grains), mine in sorted(
+        runs.items(), key=lambda r: (r[0][1], float(r[0][0]))
+    ):
+        row: dict[str, Any] = {"kappa": kappa, "axial_rate": rate, "grains": grains}
+        row["seeds"] = len(mine)
+        for name in names:
+            values = np.array([run[name] for run in mine])
+            row[name] = [float(values.mean()), float(np.ptp(values)) / 2]
+        row["unconverged"] = max(run["unconverged"] for run in mine)
+        row["sweeps"] = float(np.mean([run["sweeps"] for run in mine]))
+        rows.append(row)
+    (DOCS / "peers.json").write_text(json.dumps(rows, indent=1))
+    lines = [
+        "| program | disks | κ | axial I | z | z_backbone | rattlers | a | q/p | unconverged |",
+        "|" + "---|" * 10,
+    ]
+    for row in rows:
+        cells = [f"{row[n][0]:.3f} ± {row[n][1]:.3f}" for n in ("z", "z_backbone")]
+        cells += [f"{100 * row['rattler_fraction'][0]:.1f} %"]
+        cells += [f"{row[n][0]:.3f} ± {row[n][1]:.3f}" for n in ("a", "q_over_p")]
+        kappa = "rigid" if row["kappa"] == "inf" else f"{float(row['kappa']):.0e}"
+        lines.append(
+            f"| granufab | {row['grains']} | {kappa} | {row['axial_rate']:.0e} | "
+            + " | ".join(cells)
+            + f" | {100 * row['unconverged']:.2f} % |"
+        )
+    for kappa, rate, grains, z, backbone, a in LAMMPS:
+        lines.append(
+            f"| LAMMPS | {grains} | {kappa} | {rate} | {z} | {backbone} | "
+            f"{100 * (1 - z / backbone):.1f} % | {a} | – | – |"
+        )
+    insert("peers.md", "peers", "\n".join(lines))
+
+
+def critical(folder: Path) -> None:
+    """Critical states by friction and criterion."""
+    data = json.loads((folder / "critical-states.json").read_text())
+    (DOCS / "critical-states.json").write_text(json.dumps(data, indent=1))
+    names = ("z", "z_backbone", "a_signed", "az", "q_over_p", "phi")
+    lines = [
+        "| µ | criterion | z | z_backbone | a | a·z_backbone | q/p | φ |",
+        "|" + "---|" * 8,
+    ]
+    for row in data["rows"]:
+        cells = [f"{row[n]['value']:.3f} ± {row[n]['error'] or 0:.3f}" for n in names]
+        lines.append(f"| {row['mu']} | {row['criterion']} | " + " | ".join(cells) + " |")
+    insert("critical-states.md", "critical states", "\n".join(lines))
+
+
+def convergence(folder: Path) -> None:
+    """Table and figures of the convergence study."""
+    from convergence_report import write
+
+    insert("convergence.md", "convergence", write(folder, DOCS))
+
+
+if __name__ == "__main__":
+    {"peers": peers, "critical": critical, "convergence": convergence}[sys.argv[1]](
+        Path(sys.argv[2])
+    )
