@@ -140,3 +140,13 @@ def _wait_for_frames(path: Path, process: subprocess.Popen[str]) -> None:
             return
         time.sleep(0.1)
     raise AssertionError("no frames within two minutes")
+
+
+def test_a_run_that_fails_before_its_first_frame_leaves_nothing(granufab, tmp_path: Path) -> None:
+    case = tmp_path / "case.toml"
+    case.write_text("[sample]\ngrain_count = 60\ncoordination = 4.5\n")
+    out = tmp_path / "out"
+    result = granufab("run", case, "--out", out)
+    assert result.code == 1
+    assert "gives z_backbone from" in result.err
+    assert list(out.iterdir()) == []

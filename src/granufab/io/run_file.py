@@ -92,6 +92,11 @@ class RunFileWriter:
         self._data = {e.name: _dataset(self._file, e, (), 256) for e in entries("rows", "bytes")}
         self._file.flush()
 
+    @property
+    def frame_count(self) -> int:
+        """Frames written so far."""
+        return self._frames
+
     def __enter__(self) -> Self:
         return self
 

@@ -71,9 +71,16 @@ def run_into_folder(
         (folder / name).unlink()
     write_text(to_toml(case), folder / "settings.toml")
     settings = case.model_dump(mode="json")
-    with RunFileWriter(folder / "run.h5", settings=settings, force=True) as recorder:
-        run = simulate(case, record=recorder, progress=progress, **given)
-        recorder.close(None if run.summary.get("interrupted") else run.summary)
+    recorder = RunFileWriter(folder / "run.h5", settings=settings, force=True)
+    try:
+        with recorder:
+            run = simulate(case, record=recorder, progress=progress, **given)
+            recorder.close(None if run.summary.get("interrupted") else run.summary)
+    except BaseException:
+        if recorder.frame_count == 0:  # nothing worth keeping: a rerun needs no force
+            for name in ("run.h5", "settings.toml"):
+                (folder / name).unlink(missing_ok=True)
+        raise
     write_series(run.series, folder / "series.csv", case.name)
     write_json(_summary(case, run), folder / "summary.json")
     return run
