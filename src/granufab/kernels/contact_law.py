@@ -80,7 +80,7 @@ def cone_defect(p_n, p_t, u_n, u_t, rho, mu):
     trial_n = p_n - rho * (u_n + mu * norm(u_t))
     trial_t = axpy(-rho, u_t, p_t)
     size = norm(trial_t)
-    if size <= mu * trial_n:
+    if trial_n >= 0.0 and size <= mu * trial_n:
         new_n = trial_n
         new_t = trial_t
     elif mu * size <= -trial_n:
