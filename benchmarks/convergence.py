@@ -46,9 +46,8 @@ GROUPS: dict[str, list[dict[str, float]]] = {
         job(1e-4, 1.6e5, 3e-3, 1e-4),
         job(1e-4, 1.6e5, 1e-3, 5e-5),
         job(1e-4, 1.6e5, 3e-4, 1.5e-5),
-        job(1e-4, 1.6e5, 1e-4, 5e-6),
     ],
-    "rate-slowest": [job(1e-4, 1.6e5, 3e-5, 5e-6)],
+    "rate-slow": [job(1e-4, 1.6e5, 1e-4, 5e-6), job(1e-4, 1.6e5, 3e-5, 5e-6)],
     "step": [job(1e-4, 1.6e5, 1e-3, s) for s in (4e-4, 2e-4, 1e-4, 5e-5, 2e-5)],
 }
 

@@ -328,7 +328,7 @@ def shear(
     *,
     strain: float = 0.3,
     friction: float = 0.4,
-    inertial_number: float = 1e-3,
+    inertial_number: float = 3e-4,
     loading: str = "constant-mean",
     pressure: float = 1.0,
     solver: Solver | None = None,

@@ -156,7 +156,7 @@ class Stage(_Settings):
         description="deviatoric strain, negative reverses; isotropic ignores it: relaxes to rest",
     )
     inertial_number: Positive | None = Field(
-        default=1e-3,
+        default=3e-4,
         description="I = rate sqrt(m/p) (2D), rate d sqrt(density/p) (3D); sets the rate",
     )
     rate: Positive | None = Field(
