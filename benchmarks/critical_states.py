@@ -31,6 +31,7 @@ def run_job(mu: float, seed: int, grains: int) -> dict[str, dict[str, float]]:
         sample.packing,
         strain=0.4,
         friction=mu,
+        inertial_number=1e-3,
         record_settings=g.Record(series_interval=2e-3, frame_interval=5e-3, reach=0.05),
     )
     found: dict[str, dict[str, float]] = {}
