@@ -26,7 +26,10 @@ __all__ = [
 FORCE_FRACTION = 1e-6
 """A contact bears force above this share of the mean normal force."""
 
-_ALLOWED = "force, gap:DELTA (mean diameters, for example gap:0.015) or listed"
+_ALLOWED = (
+    "force, force:SHARE (of the mean normal force, for example force:0.001), "
+    "gap:DELTA (mean diameters, for example gap:0.015) or listed"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,24 +37,31 @@ class Criterion:
     """A rule that says which pairs are contacts.
 
     Attributes:
-        kind: ``force`` (|f·n| above 10⁻⁶ of its mean), ``gap`` or ``listed`` (all pairs).
+        kind: ``force`` (|f·n| above a share of its mean), ``gap`` or ``listed`` (all pairs).
         gap: largest surface distance of a contact [mean diameters], for ``gap`` only.
+        share: of the mean normal force, above which a contact bears force [-], for ``force``.
     """
 
     kind: Literal["force", "gap", "listed"]
     gap: float = 0.0
+    share: float = FORCE_FRACTION
 
     @property
     def text(self) -> str:
         """The words that :func:`parse_criterion` reads back."""
-        return f"gap:{self.gap!r}" if self.kind == "gap" else self.kind
+        if self.kind == "gap":
+            return f"gap:{self.gap!r}"
+        if self.kind == "force" and self.share != FORCE_FRACTION:
+            return f"force:{self.share!r}"
+        return self.kind
 
 
 def parse_criterion(text: str | Criterion) -> Criterion:
     """Read a contact criterion from its words.
 
     Args:
-        text: ``force``, ``listed`` or ``gap:δ`` with δ in mean diameters, 0 ≤ δ ≤ 1.
+        text: ``force`` (the share 10⁻⁶), ``force:x`` with 0 ≤ x ≤ 10, ``listed``, or ``gap:δ``
+            with δ in mean diameters, 0 ≤ δ ≤ 1.
     Raises:
         InvalidSettings: any other text.
     """
@@ -63,15 +73,19 @@ def parse_criterion(text: str | Criterion) -> Criterion:
     if words == "listed":
         return Criterion("listed")
     kind, colon, value = words.partition(":")
-    if kind != "gap" or not colon:
+    if kind not in ("force", "gap") or not colon:
         raise InvalidSettings(f"criterion {text!r} is unknown; allowed: {_ALLOWED}")
     try:
-        gap = float(value)
+        number = float(value)
     except ValueError:
         raise InvalidSettings(f"criterion {text!r}: {value!r} is no number; {_ALLOWED}") from None
-    if not (math.isfinite(gap) and 0.0 <= gap <= 1.0):
+    if kind == "force":
+        if not 0.0 <= number <= 10.0:
+            raise InvalidSettings(f"criterion {text!r}: the share of the mean must lie in 0..10")
+        return Criterion("force", share=number)
+    if not 0.0 <= number <= 1.0:
         raise InvalidSettings(f"criterion {text!r}: the gap must lie in 0..1 mean diameters")
-    return Criterion("gap", gap)
+    return Criterion("gap", number)
 
 
 def mean_diameter(packing: Packing) -> float:
@@ -94,8 +108,8 @@ def select_contacts(
 ) -> Contacts:
     """The pairs of a packing that count as contacts.
 
-    ``force``: |f·n| > 10⁻⁶ <f_n>, the mean over contacts with f_n > 0. ``gap:δ``: surface
-    distance < δ d. ``listed``: every pair the source lists.
+    ``force``: |f·n| > 10⁻⁶ <f_n>, the mean over contacts with f_n > 0; ``force:x``: the share x
+    instead of 10⁻⁶. ``gap:δ``: surface distance < δ d. ``listed``: every pair the source lists.
 
     Args:
         packing: needs contact forces for ``force``, a contact list for ``listed``.
@@ -120,7 +134,7 @@ def select_contacts(
     if rule.kind == "listed":
         return contacts
     force = normal_force(contacts)
-    return contacts.select(np.abs(force) > force_threshold(force))
+    return contacts.select(np.abs(force) > force_threshold(force, rule.share))
 
 
 def wall_support(
@@ -151,7 +165,7 @@ def wall_support(
         grain = walls.grain
     else:
         force = np.einsum("ci,ci->c", walls.force, walls.normal)
-        grain = walls.grain[np.abs(force) > _wall_threshold(packing, force)]
+        grain = walls.grain[np.abs(force) > _wall_threshold(packing, force, rule.share)]
     return np.bincount(grain, minlength=packing.grains.count) if len(grain) else None
 
 
@@ -159,22 +173,23 @@ def _complete(rule: Criterion, reach: float | None) -> bool:
     return reach is not None and reach >= rule.gap
 
 
-def force_threshold(force: Array) -> float:
-    """Normal force above which a contact bears force: 10⁻⁶ of the mean over f_n > 0 [N].
+def force_threshold(force: Array, share: float = FORCE_FRACTION) -> float:
+    """Normal force above which a contact bears force: a share of the mean over f_n > 0 [N].
 
     Args:
         force: normal forces or impulses, shape (contact_count,).
+        share: of the mean [-].
     """
     pushing = force[force > 0]
     if not len(pushing):
         pushing = np.abs(force[force != 0])
-    return FORCE_FRACTION * float(pushing.mean()) if len(pushing) else 0.0
+    return share * float(pushing.mean()) if len(pushing) else 0.0
 
 
-def _wall_threshold(packing: Packing, wall_force: Array) -> float:
+def _wall_threshold(packing: Packing, wall_force: Array, share: float) -> float:
     contacts = packing.contacts
     if contacts is not None and contacts.force is not None:
-        threshold = force_threshold(normal_force(contacts))
-        if threshold > 0:
-            return threshold
-    return force_threshold(wall_force)
+        force = normal_force(contacts)
+        if force.any():
+            return force_threshold(force, share)
+    return force_threshold(wall_force, share)
