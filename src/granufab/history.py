@@ -92,6 +92,8 @@ class Frame:
         direction: contraction axis of the first stage, unit vector, shape (D,).
         statistics: of the steps since the previous record.
         remap: accumulated integer lattice change of a sheared cell, shape (D, D).
+        extension: extension axis of the first stage, unit vector, shape (D,), where a 3D loading
+            drives the axes across ``direction`` differently (simple shear, true triaxial).
     """
 
     packing: Packing
@@ -104,6 +106,7 @@ class Frame:
     direction: Array
     statistics: StepStatistics = StepStatistics()
     remap: Array | None = None
+    extension: Array | None = None
 
 
 class FrameSource(Protocol):

@@ -86,6 +86,7 @@ def random_frame(
         direction=direction,
         statistics=StepStatistics(**statistics),
         remap=optional("remap", rng.integers(-3, 4, (d, d)).astype(float)),
+        extension=optional("extension", rng.standard_normal(d)),
     )
 
 

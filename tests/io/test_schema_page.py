@@ -66,5 +66,5 @@ def test_names_and_bits_are_unique() -> None:
     for entry in SCHEMA:
         if entry.bit is not None:
             groups.setdefault(entry.bit, set()).add(entry.name.split("/")[0])
-    assert sorted(groups) == list(range(10))
+    assert sorted(groups) == list(range(11))
     assert all(len(owners) == 1 for owners in groups.values())

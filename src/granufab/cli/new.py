@@ -8,7 +8,9 @@ import typer
 
 __all__ = ["new"]
 
-Name = Literal["isotropic", "shear", "biaxial", "simple-shear", "reversal"]
+Name = Literal[
+    "isotropic", "shear", "biaxial", "triaxial", "true-triaxial", "simple-shear", "reversal"
+]
 
 
 def new(name: Annotated[Name, typer.Argument(help="Which loading the case describes.")]) -> None:

@@ -15,6 +15,16 @@ TEMPLATES: dict[str, Case] = {
     ),
     "shear": Case(name="shear", path=(Stage(loading="constant-mean", strain=0.3),)),
     "biaxial": Case(name="biaxial", path=(Stage(loading="biaxial", strain=0.3),)),
+    "triaxial": Case(
+        name="triaxial",
+        sample=Sample(dimension=3),
+        path=(Stage(loading="triaxial", strain=0.4),),
+    ),
+    "true-triaxial": Case(
+        name="true-triaxial",
+        sample=Sample(dimension=3),
+        path=(Stage(loading="constant-mean", strain=0.4, b=0.5),),
+    ),
     "simple-shear": Case(name="simple-shear", path=(Stage(loading="simple-shear", strain=0.3),)),
     "reversal": Case(
         name="reversal",

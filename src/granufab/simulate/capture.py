@@ -73,7 +73,11 @@ def capture_packing(simulation: Simulation, *, reach: float = 0.05, source: str 
 
 
 def measure_now(
-    simulation: Simulation, *, direction: Array, z_definition: str = "z_backbone"
+    simulation: Simulation,
+    *,
+    direction: Array,
+    minor: Array | None = None,
+    z_definition: str = "z_backbone",
 ) -> dict[str, float]:
     """z in three ways, rattlers, a, a', θ_c of the force-bearing contacts of the last solve."""
     c, count = simulation.candidates, simulation.grain_count
@@ -85,6 +89,7 @@ def measure_now(
         c.impulse_n[grains],
         count,
         direction=direction,
+        minor=minor,
         z_definition=z_definition,  # type: ignore[arg-type]
         minimum=2 if simulation.material.friction > 0 else simulation.dimension + 1,
         support=_wall_support(simulation, pushing & ~grains),
@@ -169,7 +174,12 @@ def series_row(
 ) -> dict[str, float]:
     """One row of the series (columns as in :data:`granufab.history.SERIES_UNITS`)."""
     s = simulation
-    values = measure_now(s, direction=place["direction"], z_definition=place["z_definition"])
+    values = measure_now(
+        s,
+        direction=place["direction"],
+        minor=place["minor"],
+        z_definition=place["z_definition"],
+    )
     principal = np.sort(np.linalg.eigvalsh(0.5 * (s.stress + s.stress.T)))
     mean = float(principal.mean())
     deviator = float(principal[-1] - principal[0]) / s.dimension
@@ -203,4 +213,5 @@ def capture_frame(
         direction=place["direction"],
         statistics=statistics,
         remap=simulation.remap.astype(float),
+        extension=place["minor"],
     )

@@ -65,6 +65,25 @@ class Loading:
         return int(self.dilation) + int(self.free.sum())
 
     @property
+    def axisymmetric(self) -> bool:
+        """Whether the axes across ``direction`` are driven alike, as always in 2D."""
+        if self.dimension == 2:
+            return True
+        across = np.eye(3) - np.outer(self.direction, self.direction)
+        for matrix in (self.rate, self.free.astype(float)):
+            lateral = across @ matrix @ across
+            rest = (
+                matrix
+                - lateral
+                - np.outer(self.direction, self.direction)
+                * (self.direction @ matrix @ self.direction)
+            )
+            alike = lateral - across * (np.trace(lateral) / 2)
+            if np.abs(rest).max() + np.abs(alike).max() > 1e-12 * (1 + np.abs(matrix).max()):
+                return False
+        return True
+
+    @property
     def deviatoric_rate(self) -> float:
         """Imposed ε̇_q along direction and extension [1/s]."""
         d, e = self.direction, self.extension
@@ -118,16 +137,32 @@ def Isotropic(*, pressure: float = 1.0, dimension: int = 2, diagonals: bool = Fa
 
 
 def ConstantMean(
-    *, rate: float, pressure: float = 1.0, axis: int = 1, dimension: int = 2
+    *,
+    rate: float,
+    pressure: float = 1.0,
+    axis: int = 1,
+    dimension: int = 2,
+    b: float | None = None,
 ) -> Loading:
     """Shear at constant mean stress with imposed ε̇_q: the loading of [Radjai2012, Figs 5, 7, 8].
 
-    L = λ1 + deviator, λ free; contraction along ``axis``. 2D: ε̇_q = ε̇1 − ε̇2, 3D: ε̇1 − ε̇3
-    with two equal extensions. rate < 0 reverses.
+    L = λ1 + deviator, λ free; contraction along ``axis`` x_1. 2D: ε̇_q = ε̇1 − ε̇2, 3D: ε̇1 − ε̇3.
+    In 3D two equal extensions by default (triaxial compression); rate < 0 makes it triaxial
+    extension along ``axis``. True triaxial: ``b`` = (ε̇2 − ε̇3)/(ε̇1 − ε̇3), the extension ε̇3
+    along the axis after ``axis``; b = 0 compression, 1/2 pure shear, 1 two equal contractions.
+
+    Raises:
+        InvalidSettings: b in 2D or outside 0..1.
     """
     direction, extension = _axes(axis, dimension)
+    if b is not None and (dimension == 2 or not 0 <= b <= 1):
+        raise InvalidSettings(f"loading b is {b}, allowed 0..1 in 3D")
     gradient = np.eye(dimension) * (rate / dimension)
     gradient[axis, axis] -= rate
+    if b is not None:
+        gradient += np.eye(dimension) * (rate * b / dimension)
+        middle = (axis + 2) % dimension
+        gradient[middle, middle] -= rate * b
     return Loading(
         rate=gradient,
         free=np.zeros((dimension, dimension), dtype=bool),
@@ -201,8 +236,10 @@ def loading_of_stage(
     if stage.loading == "isotropic":
         return Isotropic(pressure=pressure, dimension=dimension)
     if stage.loading == "constant-mean":
-        return ConstantMean(rate=signed, pressure=pressure, axis=stage.axis, dimension=dimension)
-    if stage.loading == "biaxial":
+        return ConstantMean(
+            rate=signed, pressure=pressure, axis=stage.axis, dimension=dimension, b=stage.b
+        )
+    if stage.loading in ("biaxial", "triaxial"):
         axial = signed * (dimension - 1) / dimension
         return Biaxial(axial_rate=axial, pressure=pressure, axis=stage.axis, dimension=dimension)
     return SimpleShear(

@@ -64,8 +64,7 @@ class _Follower:
         settings: Record,
         name: str,
         progress: Progress | None,
-        direction: np.ndarray,
-        extension: np.ndarray,
+        axes: Loading,
     ) -> None:
         self.simulation, self.recorders, self.settings = simulation, recorders, settings
         self.progress, self.name = progress, name
@@ -77,8 +76,9 @@ class _Follower:
             "eps_q_total": 0.0,
             "stage": 0,
             "inertial_number": 0.0,
-            "direction": direction,
-            "extension": extension,
+            "direction": axes.direction,
+            "extension": axes.extension,
+            "minor": None if axes.axisymmetric else axes.extension,
             "z_definition": settings.z_definition,
             "reach": min(settings.reach, simulation.solver.skin),
         }
@@ -215,9 +215,7 @@ def run(
     first = next((s.loading for s in path if s.loading.deviatoric_rate), path[0].loading)
     simulation = Simulation(packing, path[0].loading, material=material, solver=solver)
     recorders = [memory] if record is None else [memory, record]
-    follower = _Follower(
-        simulation, recorders, record_settings, name, progress, first.direction, first.extension
-    )
+    follower = _Follower(simulation, recorders, record_settings, name, progress, first)
     total = sum(abs(step.strain or 0.0) for step in path) or 1.0
     interrupted = False
     done = 0.0
@@ -344,7 +342,7 @@ def shear(
         strain: ε_q to walk, negative reverses.
         friction: µ between grains.
         inertial_number: I = ε̇_q √(m/p) (2D), ε̇_q d √(ρ/p) (3D).
-        loading: constant-mean, biaxial, simple-shear, simple-shear-volume.
+        loading: constant-mean, biaxial (2D), triaxial (3D), simple-shear, simple-shear-volume.
         pressure: p [N/m^(D−1)].
         solver, record, record_settings, progress, name: as in :func:`run`.
     """

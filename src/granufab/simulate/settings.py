@@ -147,13 +147,13 @@ class Stage(_Settings):
     """One stage of the loading path."""
 
     loading: Literal[
-        "isotropic", "constant-mean", "biaxial", "simple-shear", "simple-shear-volume"
+        "isotropic", "constant-mean", "biaxial", "triaxial", "simple-shear", "simple-shear-volume"
     ] = Field(
         default="constant-mean", description="which cell components are rate- and stress-driven"
     )
     strain: float = Field(
         default=0.3,
-        description="deviatoric strain, negative reverses; isotropic ignores it: relaxes to rest",
+        description="deviatoric strain, negative reverses or extends; isotropic relaxes to rest",
     )
     inertial_number: Positive | None = Field(
         default=3e-4,
@@ -164,7 +164,11 @@ class Stage(_Settings):
     )
     axis: Annotated[int, Field(ge=0, le=2)] = Field(
         default=1,
-        description="compression axis (constant-mean, biaxial), gradient axis (simple shear)",
+        description="compression axis, in simple shear the gradient axis",
+    )
+    b: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        default=None,
+        description="3D constant-mean: (e2 - e3)/(e1 - e3) of the strain rate; or axisymmetric",
     )
 
     @model_validator(mode="before")
@@ -183,6 +187,8 @@ class Stage(_Settings):
             raise ValueError("give inertial_number or rate")
         if self.inertial_number is not None and self.rate is not None:
             raise ValueError("give inertial_number or rate, not both")
+        if self.b is not None and self.loading != "constant-mean":
+            raise ValueError(f"b is for loading constant-mean, got loading {self.loading}")
         return self
 
 
@@ -234,11 +240,25 @@ class Case(_Settings):
                 raise ValueError(
                     f"path.{index}.axis is {stage.axis}, allowed 0..{self.sample.dimension - 1}"
                 )
+            _check_dimension(stage, index, self.sample.dimension)
             if self.sample.boundary == "walls" and stage.loading.startswith("simple-shear"):
                 raise ValueError(
                     f"path.{index}.loading is {stage.loading}, which needs a periodic sample"
                 )
         return self
+
+
+def _check_dimension(stage: Stage, index: int, dimension: int) -> None:
+    """A biaxial stage is 2D; a triaxial one and an intermediate strain rate b are 3D."""
+    needed = {"biaxial": 2, "triaxial": 3}.get(stage.loading, dimension)
+    if needed != dimension:
+        other = "triaxial" if dimension == 3 else "biaxial"
+        raise ValueError(
+            f"path.{index}.loading is {stage.loading}, but sample.dimension is {dimension}; "
+            f"use {other}"
+        )
+    if stage.b is not None and dimension == 2:
+        raise ValueError(f"path.{index}.b is {stage.b:g}, which exists only in 3D; leave it out")
 
 
 def load_case(path: Path | str, overrides: tuple[str, ...] = ()) -> Case:
