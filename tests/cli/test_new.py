@@ -10,7 +10,9 @@ import pytest
 from granufab.cli.templates import TEMPLATES
 from granufab.simulate.settings import Case, load_case
 
-NAMES = ["isotropic", "shear", "biaxial", "simple-shear", "reversal"]
+NAMES = [
+    "isotropic", "shear", "biaxial", "triaxial", "true-triaxial", "simple-shear", "reversal",
+]  # fmt: skip
 
 
 def test_the_promised_templates_exist() -> None:
@@ -47,6 +49,8 @@ def test_templates_differ_in_what_drives_the_cell(granufab) -> None:
         "isotropic": "isotropic",
         "shear": "constant-mean",
         "biaxial": "biaxial",
+        "triaxial": "triaxial",
+        "true-triaxial": "constant-mean",
         "simple-shear": "simple-shear",
         "reversal": "constant-mean",
     }

@@ -34,10 +34,13 @@ SETTLED_ENERGY = 1e-8
 RESTING_OVERLAP = 2e-6
 FRICTION_HIGH = 5.0
 TRIALS = 12
-# z_backbone against compaction friction of 2D samples made by this very protocol (2,000 disks):
-# only a first guess, every sample is measured.
+# z_backbone against compaction friction of samples made by this very protocol (2,000 disks,
+# 1,000 spheres): only a first guess, every sample is measured.
 GUESS_FRICTION = np.array([0.0, 0.01, 0.03, 0.1, 0.2, 0.3, 0.5, 1.0, 5.0])
-GUESS_Z = np.array([4.0, 3.95, 3.85, 3.65, 3.47, 3.33, 3.2, 3.1, 3.05])
+GUESS_Z = {
+    2: np.array([4.0, 3.95, 3.85, 3.65, 3.47, 3.33, 3.2, 3.1, 3.05]),
+    3: np.array([6.0, 5.83, 5.62, 5.2, 4.81, 4.57, 4.3, 4.13, 4.1]),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -265,6 +268,7 @@ class _Search:
     def __init__(self, start: Packing, sample: Sample, progress: Progress | None) -> None:
         self.start, self.sample, self.progress = start, sample, progress
         self.z: dict[float, float] = {}
+        self.guess = GUESS_Z[sample.dimension]
         self.best: tuple[float, Simulation, dict[str, Any]] | None = None
 
     def attempt(self, friction: float) -> float:
@@ -297,8 +301,8 @@ class _Search:
         if wanted > 2 * self.sample.dimension + tolerance:
             self._refuse(wanted)
         low, high = 0.0, FRICTION_HIGH
-        z_low, z_high = GUESS_Z[0], GUESS_Z[-1]
-        trial = float(np.interp(-wanted, -GUESS_Z, GUESS_FRICTION))
+        z_low, z_high = self.guess[0], self.guess[-1]
+        trial = float(np.interp(-wanted, -self.guess, GUESS_FRICTION))
         for _ in range(TRIALS):
             z = self.attempt(trial)
             if abs(z - wanted) <= tolerance:
@@ -317,16 +321,16 @@ class _Search:
 
     def _next(self, wanted: float, low: tuple[float, float], high: tuple[float, float]) -> float:
         """Next friction between a bracket: the guess curve shifted through both ends."""
-        if low[0] == 0.0 and low[0] not in self.z and wanted >= GUESS_Z[0] - 0.02:
+        if low[0] == 0.0 and low[0] not in self.z and wanted >= self.guess[0] - 0.02:
             return 0.0
         if high[0] == FRICTION_HIGH and high[0] not in self.z and low[0] >= 1.0:
             return FRICTION_HIGH
-        guess = np.interp([low[0], high[0]], GUESS_FRICTION, GUESS_Z)
+        guess = np.interp([low[0], high[0]], GUESS_FRICTION, self.guess)
         span = low[1] - high[1]
         share = (low[1] - wanted) / span if span > 1e-6 else 0.5
         share = min(max(share, 0.1), 0.9)
         target = guess[0] + share * (guess[1] - guess[0])
-        trial = float(np.interp(-target, -GUESS_Z, GUESS_FRICTION))
+        trial = float(np.interp(-target, -self.guess, GUESS_FRICTION))
         inside = low[0] < trial < high[0]
         return trial if inside else 0.5 * (low[0] + high[0])
 
