@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from granufab.errors import InvalidSettings
 from granufab.history import Frame, Recorder, Run, StepStatistics, series_dataset
 from granufab.packing import Array, Packing
