@@ -1,0 +1,285 @@
+"""The balance of contacts along a run: every interval, its rates and their errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from granufab.errors import InvalidSettings, MissingData
+from granufab.fabric.balance import (
+    balance_attributes,
+    balance_coordinates,
+    balance_item,
+    count_balance,
+)
+from granufab.fabric.contact_identity import (
+    ContactRule,
+    IdentifiedContacts,
+    follow_contacts,
+    lattice_change,
+)
+from granufab.fabric.coordination import ZDefinition, check_definition
+from granufab.fabric.criterion import Criterion, parse_criterion
+from granufab.fabric.direction_bins import DirectionBins
+from granufab.history import Run
+from granufab.packing import Array, IntArray, Packing
+
+__all__ = ["FollowedRun", "balance_intervals", "balance_run", "count_error", "follow_run"]
+
+LEAST_STRAIN = 1e-6
+"""Intervals below this strain have no rates."""
+
+_PLACE = {
+    "eps_q_before": "deviatoric strain at the start, running",
+    "eps_q": "deviatoric strain at the end, running",
+    "eps_q_total_before": "accumulated deviatoric strain at the start",
+    "eps_q_total": "accumulated deviatoric strain at the end",
+    "strain": "sampling strain, change of ∫|dε_q| over the interval",
+    "stage": "stage of the path",
+    "frame_before": "number of the first frame",
+    "frame_after": "number of the second frame",
+}
+_ERRORS = (
+    "within an interval gains, losses and crossings of an edge are taken as Poisson events; a "
+    "count of 0 has the error of one event"
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FollowedRun:
+    """The contacts of every frame of a run, identified, and where each frame lies on the path.
+
+    Attributes:
+        contacts: of each frame.
+        eps_q: running strain of each frame [-].
+        eps_q_total: accumulated strain of each frame [-].
+        stage: of each frame.
+        direction: first contraction axis of the run, unit vector.
+        rule: which contacts count.
+        name: of the run.
+    """
+
+    contacts: Sequence[IdentifiedContacts]
+    eps_q: Sequence[float]
+    eps_q_total: Sequence[float]
+    stage: Sequence[int]
+    direction: Array
+    rule: ContactRule
+    name: str
+
+    def intervals(self, every: int) -> list[tuple[int, int]]:
+        """First and last frame of each interval of ``every`` frames, within stages.
+
+        A stage begins at the last frame of the stage before, which a run records at its end.
+
+        Raises:
+            InvalidSettings: ``every`` is below 1.
+            MissingData: no stage is long enough.
+        """
+        if every < 1:
+            raise InvalidSettings(f"an interval must be at least 1 frame, got {every}")
+        stages = np.asarray(self.stage)
+        starts = [0, *(np.flatnonzero(np.diff(stages))).tolist(), len(stages) - 1]
+        found = [
+            (first, first + every)
+            for low, high in pairwise(starts)
+            for first in range(low, high - every + 1, every)
+        ]
+        if not found:
+            longest = max(high - low for low, high in pairwise(starts))
+            raise MissingData(
+                f"run {self.name!r} has no interval of {every} frames within a stage; its longest "
+                f"stage has {longest}"
+            )
+        return found
+
+
+def balance_run(
+    run: Run,
+    *,
+    every: int = 1,
+    criterion: str | Criterion | None = None,
+    z_definition: ZDefinition = "z",
+    bins: int = 18,
+    direction: Array | None = None,
+    keep: float | None = None,
+    minimum: int = 2,
+) -> xr.Dataset:
+    """The balance of every interval of a run, with rates per grain and unit strain.
+
+    An interval lies within one stage; the first of a stage starts at the last frame of the stage
+    before. What is left of a stage after its last whole interval is not used. With ``keep`` the
+    contacts are followed through every frame, whatever ``every`` is.
+
+    Args:
+        run: recorded frames.
+        every: frames per interval: the sampling strain in units of the recording interval.
+        criterion: default the run's own, else ``force``.
+        z_definition: as for :func:`~granufab.fabric.balance`.
+        bins: as for :func:`~granufab.fabric.balance`.
+        direction: where θ starts, shape (D,); default the run's first contraction axis.
+        keep: as for :func:`~granufab.fabric.balance`, from frame to frame.
+        minimum: fewest contacts that hold a grain.
+    Returns:
+        Variables of :func:`~granufab.fabric.balance` over ``interval``; eps_q_before, eps_q,
+        eps_q_total_before, eps_q_total, strain, stage, frame_before, frame_after of each;
+        gain_rate, loss_rate over ``bin`` [1/rad in 2D, 1/sr in 3D], current_rate and
+        current_rate_affine over ``edge`` [-], per grain and unit of ∫|dε_q|, with standard
+        errors; NaN where there is no strain.
+    Raises:
+        MissingData: no stage has ``every`` + 1 frames, or a frame lacks what is needed.
+        InvalidSettings: ``every`` is below 1, or as for :func:`~granufab.fabric.balance`.
+    """
+    followed = follow_run(
+        run, criterion=criterion, z_definition=z_definition, keep=keep, minimum=minimum
+    )
+    return balance_intervals(followed, every=every, bins=bins, direction=direction)
+
+
+def follow_run(
+    run: Run,
+    *,
+    criterion: str | Criterion | None = None,
+    z_definition: ZDefinition = "z",
+    keep: float | None = None,
+    minimum: int = 2,
+) -> FollowedRun:
+    """Read every frame of a run once; :func:`balance_intervals` counts at any sampling strain.
+
+    Args:
+        run: recorded frames.
+        criterion: default the run's own, else ``force``.
+        z_definition: as for :func:`~granufab.fabric.balance`.
+        keep: as for :func:`~granufab.fabric.balance`, from frame to frame.
+        minimum: fewest contacts that hold a grain.
+    Raises:
+        MissingData: the run has no frames, or a frame lacks what the criterion needs.
+        InvalidSettings: an unknown criterion or definition, or a bad ``keep``.
+    """
+    if len(run.frames) == 0:
+        raise MissingData(f"run {run.name!r} has no recorded frames")
+    rule = ContactRule(
+        criterion=parse_criterion(criterion or _section(run, "record").get("criterion", "force")),
+        keep=keep,
+        z_definition=check_definition(z_definition),
+        minimum=minimum,
+        reach=_recorded_reach(run),
+    )
+    place: list[tuple[float, float, int]] = []
+
+    def states() -> Iterator[tuple[Packing, IntArray]]:
+        for index in range(len(run.frames)):
+            frame = run.frames[index]
+            place.append((frame.eps_q, frame.eps_q_total, frame.stage))
+            yield frame.packing, lattice_change(frame)
+
+    contacts = list(follow_contacts(states(), rule))
+    eps_q, eps_q_total, stage = zip(*place, strict=True)
+    return FollowedRun(
+        contacts=contacts,
+        eps_q=eps_q,
+        eps_q_total=eps_q_total,
+        stage=stage,
+        direction=run.frames[0].direction,
+        rule=rule,
+        name=run.name,
+    )
+
+
+def balance_intervals(
+    followed: FollowedRun, *, every: int = 1, bins: int = 18, direction: Array | None = None
+) -> xr.Dataset:
+    """The balance of every interval of a followed run, as :func:`balance_run` gives it.
+
+    Raises:
+        MissingData: no stage has ``every`` + 1 frames.
+        InvalidSettings: ``every`` is below 1, or bad bins or direction.
+    """
+    first = followed.contacts[0]
+    chosen = DirectionBins.of(
+        followed.direction if direction is None else direction, bins, first.normal.shape[1]
+    )
+    intervals = followed.intervals(every)
+    rows = [
+        count_balance(followed.contacts[low], followed.contacts[high], chosen)
+        for low, high in intervals
+    ]
+    data = {
+        name: balance_item(name, [row[name] for row in rows], over="interval") for name in rows[0]
+    }
+    data |= _places(followed, intervals)
+    dataset = xr.Dataset(data, coords=balance_coordinates(chosen))
+    dataset = dataset.assign(_rates(dataset, first.grain_count, chosen))
+    attributes = balance_attributes(followed.rule, chosen, first.grain_count)
+    return dataset.assign_attrs(
+        attributes, path=followed.name, interval_frames=every, error_bars=_ERRORS
+    )
+
+
+def _places(followed: FollowedRun, intervals: Sequence[tuple[int, int]]) -> dict[str, tuple]:
+    low, high = np.array(intervals).T
+    eps_q, total = np.array(followed.eps_q), np.array(followed.eps_q_total)
+    columns = {
+        "eps_q_before": eps_q[low],
+        "eps_q": eps_q[high],
+        "eps_q_total_before": total[low],
+        "eps_q_total": total[high],
+        "strain": total[high] - total[low],
+        "stage": np.array(followed.stage)[high],
+        "frame_before": low,
+        "frame_after": high,
+    }
+    return {
+        name: ("interval", value, {"units": "-", "long_name": _PLACE[name]})
+        for name, value in columns.items()
+    }
+
+
+def _rates(dataset: xr.Dataset, grain_count: int, bins: DirectionBins) -> dict[str, tuple]:
+    """Counts per grain, unit strain and, for gain and loss, unit of direction."""
+    strain = dataset["strain"].to_numpy()
+    per = np.where(strain > LEAST_STRAIN, strain, math.nan)[:, None] * grain_count
+    unit = "1/rad" if bins.dimension == 2 else "1/sr"
+    rates: dict[str, tuple] = {}
+    for name in ("gain", "loss"):
+        count = dataset[name].to_numpy()
+        where, size = ("interval", "bin"), per * bins.measure
+        text = {"units": unit, "long_name": f"contacts {name} per grain and unit strain"}
+        rates[f"{name}_rate"] = (where, count / size, text)
+        rates[f"{name}_rate_error"] = (where, count_error(count) / size, _error_of(text))
+    where = ("interval", "edge")
+    text = {"units": "-", "long_name": "current J per grain and unit strain, growing θ positive"}
+    rates["current_rate"] = (where, dataset["current"].to_numpy() / per, text)
+    error = count_error(dataset["crossings"].to_numpy()) / per
+    rates["current_rate_error"] = (where, error, _error_of(text))
+    affine = {"units": "-", "long_name": "J of the mean flow per grain and unit strain"}
+    rates["current_rate_affine"] = (where, dataset["current_affine"].to_numpy() / per, affine)
+    return rates
+
+
+def count_error(count: Array | IntArray) -> Array:
+    """Standard error of Poisson counts; that of one event where there is none."""
+    return np.sqrt(np.maximum(count, 1.0))
+
+
+def _error_of(text: Mapping[str, str]) -> dict[str, str]:
+    return {"units": text["units"], "long_name": "standard error of " + text["long_name"]}
+
+
+def _section(run: Run, name: str) -> Mapping[str, Any]:
+    section = run.settings.get(name, {})
+    return section if isinstance(section, Mapping) else {}
+
+
+def _recorded_reach(run: Run) -> float | None:
+    """Gap up to which a run lists every pair [mean diameters]: no more than its search margin."""
+    reach = _section(run, "record").get("reach")
+    if reach is None:
+        return None
+    return min(float(reach), float(_section(run, "solver").get("skin", math.inf)))

@@ -1,0 +1,277 @@
+"""The same contact in several states: by grain numbers and periodic image.
+
+A contact joins grain i to one image of grain j. Positions are not wrapped and images are lattice
+shifts, so (i, j, image) lasts as long as the contact does; where a sheared cell was remapped,
+C_now = C T, images are brought back to the lattice vectors before the remap, T·image.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from granufab.errors import InvalidPacking, InvalidSettings
+from granufab.fabric.coordination import ZDefinition, coordination, counted_contacts
+from granufab.fabric.criterion import Criterion, select_contacts, wall_support
+from granufab.fabric.neighbours import branch_vectors
+from granufab.history import Frame
+from granufab.packing import Array, Contacts, IntArray, Packing
+
+__all__ = [
+    "ContactRule",
+    "IdentifiedContacts",
+    "follow_contacts",
+    "identify",
+    "lattice_change",
+    "lattice_changes",
+    "packing_of",
+    "persistent",
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ContactRule:
+    """Which pairs are contacts, and which of them count.
+
+    Attributes:
+        criterion: what makes a contact.
+        keep: gap up to which a contact, once made, is kept [mean diameters], or None.
+        z_definition: whose contacts count.
+        minimum: fewest contacts that hold a grain.
+        reach: as for :func:`~granufab.fabric.select_contacts`.
+    """
+
+    criterion: Criterion
+    keep: float | None = None
+    z_definition: ZDefinition = "z"
+    minimum: int = 2
+    reach: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.keep is None:
+            return
+        least = self.criterion.gap
+        if not least <= self.keep <= 1.0:
+            raise InvalidSettings(
+                f"keep is {self.keep}, allowed {least:g}..1 mean diameters: a contact is kept at "
+                "least as far as it is made"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class IdentifiedContacts:
+    """Contacts of one state that can be found again in another.
+
+    Attributes:
+        key: numbers of grains i ≤ j and the image of j in the first lattice vectors, shape
+            (contact_count, 2 + D); no two alike.
+        pair: indices of i and j, shape (contact_count, 2).
+        normal: unit vector from i to j [-], shape (contact_count, D).
+        number: numbers of all grains, sorted, shape (grain_count,).
+        lattice: cell of the state in the first lattice vectors [m], shape (D, D), or None.
+    """
+
+    key: IntArray
+    pair: IntArray
+    normal: Array
+    number: IntArray
+    lattice: Array | None
+
+    @property
+    def count(self) -> int:
+        """Number of contacts."""
+        return len(self.key)
+
+    @property
+    def grain_count(self) -> int:
+        """Number of grains of the state, with and without contacts."""
+        return len(self.number)
+
+    def select(self, keep: NDArray) -> IdentifiedContacts:
+        """The contacts where ``keep`` (a mask or indices) says so."""
+        return self._with(self.key[keep], self.pair[keep], self.normal[keep])
+
+    def join(self, other: IdentifiedContacts) -> IdentifiedContacts:
+        """These contacts and those that only ``other``, of the same state, holds."""
+        new = np.ones(other.count, dtype=bool)
+        new[persistent(self, other)[1]] = False
+        parts = (
+            np.concatenate([mine, theirs[new]])
+            for mine, theirs in (
+                (self.key, other.key),
+                (self.pair, other.pair),
+                (self.normal, other.normal),
+            )
+        )
+        return self._with(*parts)
+
+    def _with(self, key: IntArray, pair: IntArray, normal: Array) -> IdentifiedContacts:
+        return IdentifiedContacts(
+            key=key, pair=pair, normal=normal, number=self.number, lattice=self.lattice
+        )
+
+
+def packing_of(state: Frame | Packing) -> Packing:
+    """The packing of a frame, or the packing itself."""
+    return state.packing if isinstance(state, Frame) else state
+
+
+def lattice_change(frame: Frame) -> IntArray:
+    """Integer change T of the lattice vectors since the run began, C_now = C T, shape (D, D)."""
+    if frame.remap is None:
+        return np.eye(frame.packing.dimension, dtype=np.int64)
+    return np.rint(frame.remap).astype(np.int64)
+
+
+def lattice_changes(states: Sequence[Frame | Packing]) -> list[IntArray]:
+    """Integer change T of the lattice vectors of each state against a common first basis.
+
+    Frames hold it. Of two plain packings the second may have been remapped: of T = 1 and the
+    rounded C_1⁻¹C_2 the one with the smaller strain between the two is taken, which is right for
+    strains below about a half and for any rigid rotation.
+    """
+    dimension = packing_of(states[0]).dimension
+    frames = [state for state in states if isinstance(state, Frame)]
+    if len(frames) == len(states):
+        return [lattice_change(frame) for frame in frames]
+    same = np.eye(dimension, dtype=np.int64)
+    changes = [same]
+    first = packing_of(states[0]).cell
+    for state in states[1:]:
+        cell = packing_of(state).cell
+        known = first is not None and cell is not None
+        changes.append(_remap(first.matrix, cell.matrix) if known else same)
+    return changes
+
+
+def _remap(first: Array, second: Array) -> IntArray:
+    same = np.eye(len(first), dtype=np.int64)
+    nearest = np.rint(np.linalg.solve(first, second)).astype(np.int64)
+    if round(np.linalg.det(nearest)) != 1:
+        return same
+
+    def strain(change: IntArray) -> float:
+        gradient = second @ np.linalg.inv(change) @ np.linalg.inv(first)
+        stretch = np.linalg.svd(gradient, compute_uv=False)
+        return float(np.abs(np.log(stretch)).max())
+
+    return nearest if strain(nearest) < strain(same) - 1e-9 else same
+
+
+def identify(packing: Packing, contacts: Contacts, change: IntArray) -> IdentifiedContacts:
+    """Contacts of a packing with their identity.
+
+    Args:
+        packing: the state; its grain ``number`` tells grains apart.
+        contacts: some of its pairs; where they carry no image it follows from the branches.
+        change: T of :func:`lattice_changes`, shape (D, D).
+    Raises:
+        InvalidPacking: two grains have one number, or one contact is listed twice.
+    """
+    assert packing.grains.number is not None
+    number = packing.grains.number
+    ordered = np.unique(number)
+    if len(ordered) < len(number):
+        raise InvalidPacking("grain numbers are not unique, so contacts cannot be followed")
+    image = _images(packing, contacts) @ change.T
+    turned = _turned(number[contacts.pair], image)
+    pair = np.where(turned[:, None], contacts.pair[:, ::-1], contacts.pair)
+    sign = np.where(turned, -1, 1)[:, None]
+    key = np.column_stack([number[pair], image * sign])
+    unique, first = np.unique(key, axis=0, return_index=True)
+    if len(unique) < len(key):
+        twice = key[np.setdiff1d(np.arange(len(key)), first)[0]]
+        raise InvalidPacking(
+            f"the contact of grains {twice[0]} and {twice[1]} (image {twice[2:].tolist()}) is "
+            "listed twice; list each pair once"
+        )
+    lattice = None if packing.cell is None else packing.cell.matrix @ np.linalg.inv(change)
+    return IdentifiedContacts(
+        key=key, pair=pair, normal=contacts.normal * sign, number=ordered, lattice=lattice
+    )
+
+
+def _images(packing: Packing, contacts: Contacts) -> IntArray:
+    if contacts.image is not None:
+        return contacts.image
+    if packing.cell is None:
+        return np.zeros((contacts.count, packing.dimension), dtype=np.int64)
+    i, j = contacts.pair.T
+    position = packing.grains.position
+    shift = branch_vectors(packing_with(packing, contacts)) - (position[j] - position[i])
+    fraction = np.linalg.solve(packing.cell.matrix, shift.T).T
+    return np.rint(fraction * np.array(packing.cell.periodic)).astype(np.int64)
+
+
+def packing_with(packing: Packing, contacts: Contacts) -> Packing:
+    """The same state with another list of contacts."""
+    return Packing(grains=packing.grains, contacts=contacts, cell=packing.cell)
+
+
+def _turned(numbers: IntArray, image: IntArray) -> NDArray[np.bool_]:
+    """Where i and j must change places: i > j, or a grain's own image that points backwards."""
+    turned = numbers[:, 0] > numbers[:, 1]
+    sign = np.zeros(len(image), dtype=np.int64)
+    for column in image.T:
+        sign = np.where(sign == 0, np.sign(column), sign)
+    return turned | ((numbers[:, 0] == numbers[:, 1]) & (sign < 0))
+
+
+def persistent(before: IdentifiedContacts, after: IdentifiedContacts) -> tuple[IntArray, IntArray]:
+    """Rows, in ``before`` and in ``after``, of the contacts that both hold.
+
+    Raises:
+        InvalidPacking: the two states hold different grains.
+    """
+    if not np.array_equal(before.number, after.number):
+        raise InvalidPacking(
+            f"the two states hold different grains ({before.grain_count} and "
+            f"{after.grain_count}), so contacts cannot be followed; N must be fixed"
+        )
+    keys = np.concatenate([before.key, after.key])
+    label = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
+    first, second = label[: before.count], label[before.count :]
+    _, rows, others = np.intersect1d(first, second, assume_unique=True, return_indices=True)
+    return rows.astype(np.int64), others.astype(np.int64)
+
+
+def follow_contacts(
+    states: Iterable[tuple[Packing, IntArray]], rule: ContactRule
+) -> Iterator[IdentifiedContacts]:
+    """Contacts of successive states under a rule, which with ``keep`` looks back.
+
+    A contact is made when the criterion says so. With ``keep`` it then lasts, force or not, as
+    long as its gap is below ``keep`` in every state given; a made contact lasts in any case.
+
+    Args:
+        states: packings, each with its T of :func:`lattice_changes`.
+        rule: which contacts count.
+    Raises:
+        MissingData: a state lacks what the criterion needs.
+        InvalidPacking: as for :func:`identify`.
+    """
+    known: IdentifiedContacts | None = None
+    for packing, change in states:
+        made = select_contacts(packing, rule.criterion, reach=rule.reach)
+        held = identify(packing, made, change)
+        if rule.keep is not None and known is not None:
+            near = select_contacts(packing, Criterion("gap", rule.keep), reach=rule.reach)
+            close = identify(packing, near, change)
+            held = held.join(close.select(persistent(known, close)[1]))
+        known = held
+        yield _counted(packing, held, rule)
+
+
+def _counted(
+    packing: Packing, contacts: IdentifiedContacts, rule: ContactRule
+) -> IdentifiedContacts:
+    if rule.z_definition == "z":
+        return contacts
+    support = wall_support(packing, rule.criterion, reach=rule.reach)
+    numbers = coordination(
+        contacts.pair, contacts.grain_count, minimum=rule.minimum, support=support
+    )
+    return contacts.select(counted_contacts(contacts.pair, numbers, rule.z_definition))
