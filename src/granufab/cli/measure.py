@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from granufab.history import Run
 
-__all__ = ["measure"]
+__all__ = ["check_table", "measure"]
 
 Definition = Literal["z", "z_backbone", "z_mechanical"]
 COUNTS = ("contact_count", "grain_count", "dimension", "stage")
@@ -54,7 +54,7 @@ def measure(
     """Measure z, fabric tensors, anisotropy and stress of every recorded state."""
     from granufab.cli.output import print_json, print_rows
 
-    _check_out(out, force)
+    check_table(out, force)
     tables = [_measure_file(file, criterion, z_definition, frame) for file in files]
     if out is not None:
         _write(tables, out)
@@ -86,7 +86,8 @@ def _measure_file(file: Path, criterion: str, z_definition: Any, frame: int | No
     return table.assign_coords(frame=numbers)
 
 
-def _check_out(out: Path | None, force: bool) -> None:
+def check_table(out: Path | None, force: bool) -> None:
+    """Refuse a table that cannot be written: another ending, or a file that exists."""
     if out is None:
         return
     if out.suffix not in (".csv", ".nc"):

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from granufab.history import Run
 
-__all__ = ["plot"]
+__all__ = ["check_figure", "plot"]
 
 Name = Literal["path", "zaz", "series", "mohr", "rose", "network", "homogeneity"]
 Definition = Literal["z", "z_backbone", "z_mechanical"]
@@ -42,7 +42,7 @@ def plot(
     """Draw a run: its (z, a) path, series, Mohr circle, rose, network or strain map."""
     from granufab.io import read
 
-    _check_output(output, force)
+    check_figure(output, force)
     loaded = {str(file): read(file) for file in runs}
     if figure in ("path", "zaz", "series"):
         panel = _draw_paths(figure, list(loaded.values()), z_definition)
@@ -51,7 +51,8 @@ def plot(
     cast("Figure", panel.figure).savefig(output, dpi=300)
 
 
-def _check_output(output: Path, force: bool) -> None:
+def check_figure(output: Path, force: bool) -> None:
+    """Refuse a figure that cannot be written: ending, existing file, missing folder."""
     if output.suffix.lower() not in ENDINGS:
         raise InvalidSettings(f"-o {output}: the name must end in one of {', '.join(ENDINGS)}")
     if output.exists() and not force:

@@ -1,0 +1,118 @@
+"""``granufab balance``: contacts gained, lost and turned between the states of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, cast
+
+import typer
+
+from granufab.cli.measure import check_table
+from granufab.cli.plot import check_figure
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+__all__ = ["balance"]
+
+SCALARS = (
+    *("frame_before", "frame_after", "stage", "eps_q_before", "eps_q"),
+    *("eps_q_total_before", "eps_q_total", "gained", "lost", "persistent"),
+)
+BY_BIN = ("before", "after", "gain", "loss", "current_in", "current_out")
+PARTS = tuple(
+    f"{quantity}_{part}"
+    for quantity in ("z", "az")
+    for part in ("before", "after", "gain", "loss", "rotation")
+)
+HEADER = ("frames", "ε_q", "gained", "lost", "persistent", "I+", "I-", "Δz", "Δ(za')", "turned")
+
+
+def balance(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run file.")],
+    interval: Annotated[
+        int, typer.Option(metavar="K", help="Frames between the states compared.")
+    ] = 1,
+    criterion: Annotated[
+        str, typer.Option(metavar="force|gap:δ|listed", help="Which pairs count as contacts.")
+    ] = "force",
+    bins: Annotated[int, typer.Option(metavar="B", help="Bins of direction.")] = 18,
+    keep: Annotated[
+        float | None,
+        typer.Option(metavar="GAP", help="Keep a contact up to this gap [mean diameters]."),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="A JSON list on standard output.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.csv|.nc", help="Also write all values here.")
+    ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option("-o", "--figure", metavar="FILE", help="Draw the terms by direction."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
+) -> None:
+    """Count contacts gained, lost and turned between states, by direction (eq. 16)."""
+    from granufab.cli.output import print_json, print_rows
+    from granufab.fabric import balance_run
+    from granufab.io import read
+
+    check_table(out, force)
+    if figure is not None:
+        check_figure(figure, force)
+    table = balance_run(read(run), every=interval, criterion=criterion, bins=bins, keep=keep)
+    if out is not None:
+        _write(table, out)
+    if figure is not None:
+        from granufab import plots
+
+        cast("Figure", plots.balance(table)[0].figure).savefig(figure, dpi=300)
+    if json:
+        print_json(list(_intervals(run, table)))
+        return
+    kept = "" if keep is None else f", kept to a gap of {keep:g} d"
+    title = f"{run}; contacts: {criterion}{kept}; rates per grain and unit strain"
+    print_rows(title, HEADER, _rows(table))
+
+
+def _intervals(run: Path, table: xr.Dataset) -> Iterator[dict[str, Any]]:
+    """One plain object per interval; the lists run over the bins, or over their edges."""
+    columns = {name: table[name].values.tolist() for name in (*SCALARS, *PARTS, *BY_BIN, "current")}
+    shared = {
+        "source": str(run),
+        "criterion": table.attrs["criterion"],
+        "keep": table.attrs["keep"],
+        "direction": table.attrs["direction"].tolist(),
+        "bin_edges": table["theta_edge"].values.tolist(),
+        "grain_count": int(table.attrs["grain_count"]),
+    }
+    for row in range(table.sizes["interval"]):
+        yield {name: column[row] for name, column in columns.items()} | shared
+
+
+def _rows(table: xr.Dataset) -> Iterator[list[Any]]:
+    strain, grains = table["strain"].values, table.attrs["grain_count"]
+    for row, item in enumerate(_intervals(Path(), table)):
+        per = strain[row] * grains
+        yield [
+            f"{item['frame_before']}–{item['frame_after']}",
+            item["eps_q"],
+            *(item[name] for name in ("gained", "lost", "persistent")),
+            *(item[name] / per if per > 0 else None for name in ("gained", "lost")),
+            item["z_after"] - item["z_before"],
+            item["az_after"] - item["az_before"],
+            item["az_rotation"],
+        ]
+
+
+def _write(table: xr.Dataset, out: Path) -> None:
+    """NetCDF as it is; CSV with a row per interval and bin, the upper edge of which has J."""
+    from granufab.io import write_dataset
+
+    if out.suffix == ".csv":
+        flat = table.drop_dims("edge").assign(
+            current_rate_out=(("interval", "bin"), table["current_rate"].values[:, 1:])
+        )
+        table = flat.stack(row=("interval", "bin"), create_index=False)
+    write_dataset(table, out)
