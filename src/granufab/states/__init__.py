@@ -6,7 +6,13 @@ from granufab.states.critical import CriticalState, critical_state
 from granufab.states.domain import AccessibleDomain, saturation_slopes
 from granufab.states.fit import AccessibleFit, fit_accessible_states
 from granufab.states.mohr import MohrCircle, critical_circle, limit_circles, mohr, tangent_line
-from granufab.states.steric import exclusion_angle, steric_anisotropy, steric_coordination
+from granufab.states.steric import (
+    exclusion_angle,
+    steric_anisotropy,
+    steric_coordination,
+    steric_margin,
+    window_occupation,
+)
 
 __all__ = [
     "AccessibleDomain",
@@ -27,5 +33,7 @@ __all__ = [
     "saturation_slopes",
     "steric_anisotropy",
     "steric_coordination",
+    "steric_margin",
     "tangent_line",
+    "window_occupation",
 ]
