@@ -1,6 +1,6 @@
 """Write the measured tables into the documentation pages, between markers.
 
-python benchmarks/pages.py convergence|peers|critical OUT
+python benchmarks/pages.py convergence|peers|critical|triaxial OUT
 """
 
 from __future__ import annotations
@@ -93,6 +93,38 @@ def critical(folder: Path) -> None:
     insert("critical-states.md", "critical states", "\n".join(lines))
 
 
+def triaxial(folder: Path) -> None:
+    """Critical states of spheres, and extension predicted from compression."""
+    data = json.loads((folder / "triaxial.json").read_text())
+    (DOCS / "triaxial.json").write_text(json.dumps(data, indent=1))
+
+    def interval(entry: dict[str, float]) -> str:
+        return f"{entry['value']:.3f} ({entry['low']:.3f} to {entry['high']:.3f})"
+
+    fitted = ("z_star", "a_star", "z_min", "z_max")
+    header = ("start", "loading", "z_0", "z*", "\\|a*\\|", "z_min", "z_max", "q/p", "φ", "rattlers")
+    lines = ["| " + " | ".join((*header, "unconverged")) + " |"]
+    lines.append("|" + "---|" * 11)
+    for path in data["paths"]:
+        cells = [path["start"], path["mode"], f"{path['z_0']:.2f}"]
+        cells += [interval(path[name]) for name in fitted]
+        cells += [f"{path['q_over_p']:.3f}", f"{path['phi']:.3f}"]
+        cells.append(f"{100 * path['rattler_fraction']:.1f} %")
+        solver = path["solver"]
+        cells.append(f"{solver['nonconverged_steps']} of {solver['steps']}")
+        lines.append("| " + " | ".join(cells) + " |")
+    insert("triaxial.md", "triaxial", "\n".join(lines))
+    lines = ["| | predicted | measured, dense | measured, loose |", "|" + "---|" * 4]
+    for mode in ("extension", "b = 0.5"):
+        for name, sign in (("z_star", "z*"), ("a_star", "\\|a*\\|")):
+            row = [f"{mode}, {sign}", interval(data["predicted"][f"{mode} {name}"])]
+            for start in ("dense", "loose"):
+                found = [p for p in data["paths"] if (p["start"], p["mode"]) == (start, mode)]
+                row.append(interval(found[0][name]) if found else "–")
+            lines.append("| " + " | ".join(row) + " |")
+    insert("triaxial.md", "prediction", "\n".join(lines))
+
+
 def convergence(folder: Path) -> None:
     """Table and figures of the convergence study."""
     from convergence_report import write
@@ -101,6 +133,7 @@ def convergence(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    {"peers": peers, "critical": critical, "convergence": convergence}[sys.argv[1]](
-        Path(sys.argv[2])
-    )
+    pages = {
+        "peers": peers, "critical": critical, "convergence": convergence, "triaxial": triaxial,
+    }  # fmt: skip
+    pages[sys.argv[1]](Path(sys.argv[2]))
