@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from granufab.errors import MissingData
+from granufab.errors import GranufabError, MissingData
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["fit", "fit_series", "read_paths"]
 
 Method = Literal["critical", "envelope", "lines"]
+Mode = Literal["compression", "extension"]
 Definition = Literal["z", "z_backbone", "z_mechanical"]
 
 
@@ -30,17 +32,28 @@ def fit(
     z_definition: Annotated[
         Definition | None, typer.Option(help="Which z; default z_backbone, or z if alone.")
     ] = None,
+    dimension: Annotated[
+        int | None, typer.Option(min=2, max=3, help="2 or 3; default as recorded, else 2.")
+    ] = None,
+    mode: Annotated[
+        Mode | None, typer.Option(help="3D axisymmetric; default by the sign of the late a'.")
+    ] = None,
+    b: Annotated[
+        float | None, typer.Option(min=0, max=1, help="3D: b of the loading; default as recorded.")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="JSON on standard output.")] = False,
 ) -> None:
     """Fit z_min, z_max and the critical state, with 95 % intervals.
 
-    Each path counts up to its first reversal.
+    Each path counts up to its first reversal. Dimension and b of a series.csv are those of the
+    settings.toml or run.h5 beside it.
     """
     from granufab.cli.output import print_json, print_rows
     from granufab.reproduce.report import fit_entry
 
     paths = [path for file in series for path in read_paths(file)]
-    found, definition = fit_series(paths, method, z_definition)
+    given = {"dimension": dimension, "mode": mode, "b": b}
+    found, definition = fit_series(paths, method, z_definition, **given)
     entry = fit_entry(found) | {
         "outside_significant": found.outside_significant,
         "z_definition": definition,
@@ -59,29 +72,63 @@ def fit(
 
 
 def fit_series(
-    paths: Sequence[xr.Dataset], method: Method = "critical", z_definition: str | None = None
+    paths: Sequence[xr.Dataset],
+    method: Method = "critical",
+    z_definition: str | None = None,
+    *,
+    dimension: int | None = None,
+    mode: Mode | None = None,
+    b: float | None = None,
 ) -> tuple[AccessibleFit, str]:
-    """Fit the domain to some series; returns the fit and the definition of z it used."""
+    """Fit the domain to some series; returns the fit and the definition of z it used.
+
+    What is not given of dimension, mode and b comes from the attributes of the series
+    (:mod:`granufab.reproduce.symmetry`) and the sign of a' on the plateau.
+    """
     from granufab.reproduce.recipe import first_stage
+    from granufab.reproduce.symmetry import fit_symmetry, series_symmetry
     from granufab.states import fit_accessible_states
 
     definition = z_definition or _default_definition(paths)
-    rows = [_known_rows(first_stage(path), definition) for path in paths]
+    stages = [first_stage(path) for path in paths]
+    rows = [_known_rows(stage, definition) for stage in stages]
+    symmetries = [series_symmetry(path).but(dimension=dimension, mode=mode, b=b) for path in paths]
+    options = fit_symmetry(symmetries, stages).options()
     strain, z, a = ([row[name] for row in rows] for name in ("eps_q", definition, "a"))
-    return fit_accessible_states(strain, z, a, method=method), definition
+    return fit_accessible_states(strain, z, a, method=method, **options), definition
 
 
 def read_paths(file: Path) -> list[xr.Dataset]:
-    """The series of a run file, or of each path in a CSV; rows count as strain if none is given."""
-    from granufab.io import read, read_series
+    """The series of a run file, or of each path in a CSV; rows count as strain if none is given.
 
-    table = read_series(file) if _is_text(file) else read(file).series
+    Their attributes tell dimension and b where these are known.
+    """
+    from granufab.io import read, read_series
+    from granufab.reproduce.symmetry import described_series
+
+    text = _is_text(file)
+    table = _beside(read_series(file), file) if text else described_series(read(file))
     if "eps_q" not in table:
         table = table.assign(eps_q=("record", [float(k) for k in range(table.sizes["record"])]))
     if "path" not in table.coords:
         return [table]
     names = dict.fromkeys(table.coords["path"].values.tolist())
     return [table.isel(record=table.coords["path"].values == name) for name in names]
+
+
+def _beside(series: xr.Dataset, file: Path) -> xr.Dataset:
+    """The series with the dimension and b of the run whose folder it lies in, if any."""
+    from granufab.io import read
+    from granufab.reproduce.symmetry import run_symmetry, symmetry_attributes
+    from granufab.simulate.settings import load_case
+
+    settings = None
+    with suppress(GranufabError):  # a file of another kind that happens to have this name
+        if (path := file.with_name("settings.toml")).exists():
+            settings = load_case(path).model_dump(mode="json")
+        elif (path := file.with_name("run.h5")).exists():
+            settings = read(path).settings
+    return series.assign_attrs(symmetry_attributes(run_symmetry(settings or {})))
 
 
 def _is_text(file: Path) -> bool:

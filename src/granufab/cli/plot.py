@@ -75,9 +75,10 @@ def _draw_paths(figure: str, runs: list[Run], z_definition: Any) -> Axes:
 def _domain(runs: list[Run], z_definition: str) -> Any:
     """The fitted domain, or None with a word on standard error where the runs do not give one."""
     from granufab.cli.fit import fit_series
+    from granufab.reproduce.symmetry import described_series
 
     try:
-        return fit_series([run.series for run in runs], "critical", z_definition)[0]
+        return fit_series([described_series(run) for run in runs], "critical", z_definition)[0]
     except GranufabError as error:
         print(f"granufab: drawn without limit lines: {error}", file=sys.stderr)
         return None

@@ -53,6 +53,7 @@ def run(
 
 def _fabric_pairs(case: Case, result: Run) -> list[tuple[str, Any]]:
     from granufab.cli.fit import fit_series
+    from granufab.reproduce.symmetry import described_series
 
     pairs: list[tuple[str, Any]] = [
         ("contact criterion", result.series.attrs.get("criterion", "force")),
@@ -60,7 +61,7 @@ def _fabric_pairs(case: Case, result: Run) -> list[tuple[str, Any]]:
         ("z_0", result.summary.get("z_0")),
     ]
     try:
-        fit, _ = fit_series([result.series], "critical", case.record.z_definition)
+        fit, _ = fit_series([described_series(result)], "critical", case.record.z_definition)
     except GranufabError as error:
         return [*pairs, ("z*, a*", f"not fitted: {error}")]
     estimates = (("z*", fit.z_star), ("a*", fit.a_star))

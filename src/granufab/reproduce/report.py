@@ -11,6 +11,7 @@ import granufab
 from granufab.errors import GranufabError
 from granufab.history import Run
 from granufab.reproduce.recipe import Outcome, PathRecipe, Recipe, column, first_stage, reached_z
+from granufab.reproduce.symmetry import fit_symmetry, run_symmetry
 from granufab.simulate.settings import Case
 from granufab.states import AccessibleFit, CriticalState, Estimate, critical_state
 from granufab.states import fit_accessible_states as fit_states
@@ -57,14 +58,20 @@ def fit_all(recipe: Recipe, runs: Mapping[str, list[Run]], z_definition: str) ->
 def fit_runs(
     runs: Mapping[str, Sequence[Run]], z_definition: str, method: Any = METHODS[0]
 ) -> AccessibleFit:
-    """Fit the accessible domain to the first stage of several paths and their repeats."""
-    series = [first_stage(run.series) for repeats in runs.values() for run in repeats]
+    """Fit the accessible domain to the first stage of several paths and their repeats.
+
+    Dimension, mode and b are those of the runs (:mod:`granufab.reproduce.symmetry`).
+    """
+    every = [run for repeats in runs.values() for run in repeats]
+    series = [first_stage(run.series) for run in every]
+    symmetry = fit_symmetry([run_symmetry(run.settings) for run in every], series)
     return fit_states(
         [column(item, "eps_q") for item in series],
         [column(item, z_definition) for item in series],
         [column(item, "a_signed") for item in series],
         method=method,
         seeds=_seeds(runs),
+        **symmetry.options(),
     )
 
 
@@ -112,6 +119,9 @@ def fit_entry(fit: AccessibleFit) -> dict[str, Any]:
     """A fit as plain data."""
     return {
         "method": fit.method,
+        "dimension": fit.dimension,
+        "mode": fit.mode if fit.dimension == 3 and fit.b is None else None,
+        "b": fit.b,
         "z_min": estimate(fit.z_min),
         "z_max": estimate(fit.z_max),
         "z_star": estimate(fit.z_star),
