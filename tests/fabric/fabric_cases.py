@@ -31,6 +31,10 @@ def face_centred(repeats=3):
     return lattice(np.array([[1, 1, 0], [1, 0, 1], [0, 1, 1.0]])[::-1] / np.sqrt(2), repeats)
 
 
+def body_centred(repeats=3):
+    return lattice(np.array([[-1, 1, 1], [1, -1, 1], [1, 1, -1.0]]) / np.sqrt(3), repeats)
+
+
 def draw_plane(count, a, theta_c, generator, modes=()):
     """Normals from P(θ) = (1/π)(1 + a cos 2(θ−θc) + Σ A_m cos m(θ−θ_m)), by rejection."""
     angles = np.zeros(0)

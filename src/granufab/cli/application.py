@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from granufab.cli import balance, doctor, fit, info, measure, new, plot, reproduce, run
+from granufab.cli import balance, criterion, doctor, fit, info, measure, new, plot, reproduce, run
 
 __all__ = ["app"]
 
@@ -23,6 +23,7 @@ app.command("run")(run.run)
 app.command("reproduce")(reproduce.reproduce)
 app.command("measure")(measure.measure)
 app.command("balance")(balance.balance)
+app.command("criterion")(criterion.criterion)
 app.command("fit")(fit.fit)
 app.command("plot")(plot.plot)
 app.command("info")(info.info)

@@ -4,16 +4,26 @@
 :func:`select_network` picks the contacts that the finer functions take.
 """
 
+from granufab.fabric.affine import affine_turning
+from granufab.fabric.balance import balance
+from granufab.fabric.balance_average import average_balance, rates_by_sampling
+from granufab.fabric.balance_run import balance_run
 from granufab.fabric.bootstrap import bootstrap_errors
+from granufab.fabric.branches import branches
 from granufab.fabric.coordination import Coordination, ZDefinition, coordination
 from granufab.fabric.criterion import Criterion, parse_criterion, select_contacts, wall_support
+from granufab.fabric.criterion_curves import criterion_curves, criterion_sweep
+from granufab.fabric.ensemble import late_frames
+from granufab.fabric.forces import force_statistics
+from granufab.fabric.harmonics import real_harmonics, sphere_density, sphere_orientation
 from granufab.fabric.homogeneity import homogeneity, local_strain
-from granufab.fabric.measure import criterion_sweep, measure, measure_run, quick_measure
+from granufab.fabric.measure import measure, measure_run, quick_measure
 from granufab.fabric.neighbours import branch_vectors, neighbours_within
 from granufab.fabric.network import Network, select_network
 from granufab.fabric.orientation import orientation, symmetry_axis
 from granufab.fabric.rattlers import RATTLER_RULES, backbone, minimum_contacts
 from granufab.fabric.stress import solid_fraction, stress_ratio, stress_tensor
+from granufab.fabric.stress_force_fabric import anisotropy_stress_ratio, stress_force_fabric
 from granufab.fabric.tensors import (
     anisotropy,
     anisotropy_bias,
@@ -29,6 +39,7 @@ from granufab.fabric.tensors import (
     principal_values,
     signed_anisotropy,
 )
+from granufab.fabric.texture import texture
 
 __all__ = [
     "RATTLER_RULES",
@@ -36,20 +47,29 @@ __all__ = [
     "Criterion",
     "Network",
     "ZDefinition",
+    "affine_turning",
     "anisotropy",
     "anisotropy_bias",
     "anisotropy_noise",
+    "anisotropy_stress_ratio",
+    "average_balance",
     "backbone",
+    "balance",
+    "balance_run",
     "bootstrap_errors",
     "branch_vectors",
+    "branches",
     "coordination",
+    "criterion_curves",
     "criterion_sweep",
     "deviatoric_part",
     "enriched_tensor",
     "fabric_tensor",
+    "force_statistics",
     "fourth_order_tensor",
     "homogeneity",
     "intermediate_ratio",
+    "late_frames",
     "local_strain",
     "major_angle",
     "major_direction",
@@ -62,12 +82,18 @@ __all__ = [
     "parse_criterion",
     "principal_values",
     "quick_measure",
+    "rates_by_sampling",
+    "real_harmonics",
     "select_contacts",
     "select_network",
     "signed_anisotropy",
     "solid_fraction",
+    "sphere_density",
+    "sphere_orientation",
+    "stress_force_fabric",
     "stress_ratio",
     "stress_tensor",
     "symmetry_axis",
+    "texture",
     "wall_support",
 ]

@@ -14,7 +14,7 @@ from granufab.fabric.network import Network, select_network
 from granufab.fabric.tensors import fabric_tensor, major_direction
 from granufab.packing import Array, IntArray, Packing
 
-__all__ = ["bootstrap_errors"]
+__all__ = ["bootstrap_errors", "network_errors"]
 
 _BLOCK_GRAINS = 25
 _FEWEST_BLOCKS = 8
@@ -57,6 +57,34 @@ def bootstrap_errors(
     network = select_network(
         packing, criterion=criterion, z_definition=z_definition, minimum=minimum, reach=reach
     )
+    errors = network_errors(packing, network, direction=direction, replicas=replicas, seed=seed)
+    return {name: errors[name] for name in ("z", "a_signed")}
+
+
+def network_errors(
+    packing: Packing,
+    network: Network,
+    *,
+    direction: Array | None = None,
+    replicas: int = 400,
+    seed: int = 0,
+) -> dict[str, float]:
+    """Standard errors as :func:`bootstrap_errors`, of a network that is already picked.
+
+    The same seed draws the same blocks, so that errors of one state under several criteria
+    belong together.
+
+    Args:
+        packing: positions are used to form the blocks.
+        network: contacts and grains in use.
+        direction: axis of a', shape (D,); default the network's own major direction.
+        replicas: number of resampled states.
+        seed: of the resampling.
+    Returns:
+        ``z``, ``a_signed``, ``az`` (of a' times z) and ``rattler_fraction``, standard errors [-].
+    Raises:
+        MissingData: no contacts, or too few grains for 8 blocks.
+    """
     if direction is None:
         direction = major_direction(fabric_tensor(network.contacts))
     sums = _block_sums(packing, network, np.asarray(direction, dtype=float))
@@ -68,18 +96,20 @@ def bootstrap_errors(
         )
     generator = np.random.default_rng(seed)
     weight = generator.multinomial(blocks, np.full(blocks, 1.0 / blocks), size=replicas)
-    grains, ends, all_ends, along = (weight @ sums).T
+    grains, ends, all_ends, along, everything, held = (weight @ sums).T
     with np.errstate(invalid="ignore", divide="ignore"):
         z = ends / grains
         square = along / all_ends
     a = 2.0 * (2.0 * square - 1.0) if packing.dimension == 2 else 1.25 * (3.0 * square - 1.0)
     # Sampling with replacement from B blocks shrinks the variance by (B − 1)/B.
     scale = math.sqrt(blocks / (blocks - 1))
-    return {"z": scale * float(np.nanstd(z)), "a_signed": scale * float(np.nanstd(a))}
+    resampled = {"z": z, "a_signed": a, "az": a * z, "rattler_fraction": 1.0 - held / everything}
+    return {name: scale * float(np.nanstd(value)) for name, value in resampled.items()}
 
 
 def _block_sums(packing: Packing, network: Network, direction: Array) -> Array:
-    """Per block: counted grains, counted contact ends, all ends of contacts in use, Σ(n·d)²."""
+    """Per block: counted grains, counted contact ends, all ends of contacts in use, Σ(n·d)², all
+    grains, grains of the backbone."""
     block = _blocks(packing)
     ends = network.contacts.pair.ravel()
     along = (network.contacts.normal @ direction) ** 2 / float(direction @ direction)
@@ -89,6 +119,8 @@ def _block_sums(packing: Packing, network: Network, direction: Array) -> Array:
         np.bincount(owner, weights=network.counted[ends], minlength=count),
         np.bincount(owner, minlength=count),
         np.bincount(owner, weights=np.repeat(along, 2), minlength=count),
+        np.bincount(block, minlength=count),
+        np.bincount(block, weights=network.coordination.held, minlength=count),
     ]
     table = np.column_stack(sums).astype(np.float64)
     return table[np.bincount(block, minlength=count) > 0]

@@ -39,7 +39,7 @@ from granufab.fabric.tensors import (
 from granufab.history import SERIES_UNITS, Frame, Run
 from granufab.packing import Array, IntArray, Packing
 
-__all__ = ["criterion_sweep", "measure", "measure_run", "quick_measure"]
+__all__ = ["measure", "measure_run", "quick_measure", "run_definitions", "values_dataset"]
 
 Value = float | str | None
 
@@ -154,14 +154,7 @@ def measure_run(
     """
     if len(run.frames) == 0:
         raise MissingData(f"run {run.name!r} has no recorded frames")
-    record = run.settings.get("record", {})
-    record = record if isinstance(record, Mapping) else {}
-    rule = parse_criterion(criterion or record.get("criterion", "force"))
-    definition = check_definition(z_definition or record.get("z_definition", "z_backbone"))
-    if minimum is None:
-        material = run.settings.get("material", {})
-        smooth = isinstance(material, Mapping) and material.get("friction") == 0
-        minimum = minimum_contacts("frictionless" if smooth else "frictional", run.dimension)
+    rule, definition, fewest = run_definitions(run, criterion, z_definition, minimum)
     rows = []
     for index in range(len(run.frames)):
         frame = run.frames[index]
@@ -170,7 +163,7 @@ def measure_run(
             criterion=rule,
             z_definition=definition,
             direction=frame.direction if direction is None else direction,
-            minimum=minimum,
+            minimum=fewest,
             reach=_recorded_reach(run),
             bootstrap=bootstrap,
         )
@@ -179,10 +172,33 @@ def measure_run(
         "path": run.name,
         "criterion": rule.text,
         "z_definition": definition,
-        "minimum_contacts": minimum,
+        "minimum_contacts": fewest,
         "dimension": run.dimension,
     }
-    return _dataset(rows, "frame", attributes)
+    return values_dataset(rows, "frame", attributes)
+
+
+def run_definitions(
+    run: Run,
+    criterion: str | Criterion | None = None,
+    z_definition: ZDefinition | None = None,
+    minimum: int | None = None,
+) -> tuple[Criterion, ZDefinition, int]:
+    """Criterion, definition of z and fewest contacts of a held grain: by default the run's own.
+
+    A run without friction holds its grains by D + 1 contacts, any other by 2.
+
+    Raises:
+        InvalidSettings: an unknown criterion or definition.
+    """
+    record, material = (run.settings.get(name, {}) for name in ("record", "material"))
+    record = record if isinstance(record, Mapping) else {}
+    rule = parse_criterion(criterion or record.get("criterion", "force"))
+    definition = check_definition(z_definition or record.get("z_definition", "z_backbone"))
+    if minimum is None:
+        smooth = isinstance(material, Mapping) and material.get("friction") == 0
+        minimum = minimum_contacts("frictionless" if smooth else "frictional", run.dimension)
+    return rule, definition, minimum
 
 
 def _recorded_reach(run: Run) -> float | None:
@@ -194,33 +210,6 @@ def _recorded_reach(run: Run) -> float | None:
     return min(float(record["reach"]), float(solver.get("skin", math.inf)))
 
 
-def criterion_sweep(
-    packing: Packing,
-    criteria: Sequence[str] = ("force", "gap:0.001", "gap:0.005", "gap:0.015", "gap:0.05"),
-    *,
-    z_definition: ZDefinition = "z_backbone",
-    direction: Array | None = None,
-) -> xr.Dataset:
-    """z, a and az of one state against the contact criterion.
-
-    Args:
-        packing: the state.
-        criteria: words of the criteria.
-        z_definition: the z, and the contacts that a uses.
-        direction: axis of a', shape (D,).
-    Returns:
-        Variables of :func:`measure` over ``criterion``, and ``az`` with the z in use.
-    """
-    rows = [
-        measure(packing, criterion=text, z_definition=z_definition, direction=direction)
-        for text in criteria
-    ]
-    data = _dataset(rows, "criterion", {"z_definition": z_definition})
-    az = data["a"] * data[z_definition]
-    data["az"] = az.assign_attrs(units="-", long_name="anisotropy times coordination number")
-    return data.assign_coords(criterion=list(criteria))
-
-
 def quick_measure(
     pair: IntArray,
     normal: Array,
@@ -228,6 +217,7 @@ def quick_measure(
     grain_count: int,
     *,
     direction: Array | None = None,
+    minor: Array | None = None,
     z_definition: ZDefinition = "z_backbone",
     minimum: int = 2,
     support: IntArray | None = None,
@@ -241,6 +231,7 @@ def quick_measure(
             ``force``: above 10⁻⁶ of its mean.
         grain_count: number of grains.
         direction: axis of a', shape (D,).
+        minor: its axis of least contraction in true triaxial states, shape (D,).
         z_definition: whose contacts a uses.
         minimum: fewest contacts that hold a grain.
         support: wall contacts of each grain that bear force, shape (grain_count,).
@@ -266,7 +257,7 @@ def quick_measure(
         values["a"] = anisotropy(fabric)
         values["theta_c"] = _theta_c(fabric, direction)
         if direction is not None:
-            values["a_signed"] = signed_anisotropy(fabric, direction)
+            values["a_signed"] = signed_anisotropy(fabric, direction, minor=minor)
     return values
 
 
@@ -384,9 +375,10 @@ def _check_direction(direction: Array | None, dimension: int) -> Array | None:
     return direction
 
 
-def _dataset(
+def values_dataset(
     rows: Sequence[Mapping[str, Value]], dim: str, attributes: Mapping[str, Any]
 ) -> xr.Dataset:
+    """Rows of :func:`measure` as variables over ``dim``, NaN where unknown; words are left out."""
     data = {}
     for name in rows[0]:
         column = [row[name] for row in rows]

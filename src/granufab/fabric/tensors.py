@@ -100,19 +100,30 @@ def anisotropy(fabric: Array) -> float:
     return (2.0 if len(values) == 2 else 2.5) * float(values[0] - values[-1])
 
 
-def signed_anisotropy(fabric: Array, direction: Array) -> float:
+def signed_anisotropy(fabric: Array, direction: Array, *, minor: Array | None = None) -> float:
     r"""Anisotropy along a fixed direction d [-], negative where contacts avoid d.
 
     2D: :math:`a' = 2\langle\cos 2(\theta-\theta_0)\rangle = 2(2\,d·F·d - 1)`;
-    3D: :math:`a' = \frac54\langle 3(n·d)^2 - 1\rangle`.
+    3D, about an axis of symmetry: :math:`a' = \frac54\langle 3(n·d)^2 - 1\rangle`. With a second
+    axis e, for true triaxial states: 2(d·F·d − e·F·e) in 2D, (5/2)(d·F·d − e·F·e) in 3D, which
+    is the unsigned a where d and e are the major and the minor principal direction.
 
     Args:
         fabric: fabric tensor, shape (D, D).
-        direction: the loading's symmetry axis, of any length, shape (D,).
+        direction: the loading's symmetry axis, or that of largest contraction, of any length,
+            shape (D,).
+        minor: the loading's axis of least contraction, of any length, shape (D,).
     """
+    along = _along(fabric, direction)
+    if minor is not None:
+        return (2.0 if len(fabric) == 2 else 2.5) * (along - _along(fabric, minor))
+    return 2.0 * (2.0 * along - 1.0) if len(fabric) == 2 else 1.25 * (3.0 * along - 1.0)
+
+
+def _along(tensor: Array, direction: Array) -> float:
+    """Value of a tensor along a direction of any length."""
     direction = np.asarray(direction, dtype=float)
-    along = float(direction @ fabric @ direction) / float(direction @ direction)
-    return 2.0 * (2.0 * along - 1.0) if len(direction) == 2 else 1.25 * (3.0 * along - 1.0)
+    return float(direction @ tensor @ direction) / float(direction @ direction)
 
 
 def major_angle(fabric: Array) -> float:

@@ -2,24 +2,44 @@
 
 from __future__ import annotations
 
+from granufab.plots.balance import attribution, balance, sampling_rates
+from granufab.plots.branches import branches, branches_joint
+from granufab.plots.criterion_curves import criterion_curves
+from granufab.plots.forces import force_density, mobilisation
 from granufab.plots.homogeneity import homogeneity
 from granufab.plots.mohr import mohr
 from granufab.plots.network import network
 from granufab.plots.path import path
 from granufab.plots.rose import rose
+from granufab.plots.rose_3d import rose_surface
 from granufab.plots.series import series
+from granufab.plots.stress_force_fabric import stress_force_fabric, stress_ratios
 from granufab.plots.style import new_figure, save, style
+from granufab.plots.texture import occupation, texture
 from granufab.plots.zaz import zaz
 
 __all__ = [
+    "attribution",
+    "balance",
+    "branches",
+    "branches_joint",
+    "criterion_curves",
+    "force_density",
     "homogeneity",
+    "mobilisation",
     "mohr",
     "network",
     "new_figure",
+    "occupation",
     "path",
     "rose",
+    "rose_surface",
+    "sampling_rates",
     "save",
     "series",
+    "stress_force_fabric",
+    "stress_ratios",
     "style",
+    "texture",
     "zaz",
 ]

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.typing import ColorType
 
 from granufab.plots.limits import Limits, as_domain
 from granufab.plots.style import INK, new_figure, style
@@ -31,7 +32,9 @@ def mohr(
 
     The limit isotropic states L1 and L2 are points at z_min/(2D) and z_max/(2D); every
     accessible circle lies between them. The critical circle spans them and touches
-    G_t = ± tan α G_n.
+    G_t = ± tan α G_n. In 3D the circle is the one through G_1 and G_3; the two through G_2 are
+    thin, and the projections on all planes fill the tinted region between the three. In
+    axisymmetric states G_2 is one of the others, and nothing but the circle is left.
 
     Args:
         circles: a circle from :func:`granufab.mohr`, or several with their labels.
@@ -51,6 +54,11 @@ def mohr(
         for label, circle in (circles or {}).items():
             (line,) = ax.plot(*circle.points(theta), label=label, zorder=3)
             ax.plot([circle.centre], [0], "+", color=line.get_color(), ms=5, zorder=3)
+            _draw_inner(ax, circle, line.get_color())
+        if domain is None and circles:
+            top = 1.45 * max(circle.radius for circle in circles.values())  # room for the legend
+            ax.update_datalim([(circle.centre, top) for circle in circles.values()])
+            ax.autoscale_view()
         if domain is not None:
             if critical:
                 _draw_critical(ax, as_domain(domain))
@@ -60,6 +68,24 @@ def mohr(
         if ax.get_legend_handles_labels()[0]:
             ax.legend(loc="upper center", ncols=2)
     return ax
+
+
+def _draw_inner(ax: Axes, circle: MohrCircle, colour: ColorType) -> None:
+    """The two smaller circles of a 3D state and the region between the three."""
+    outer, *inner = circle.circles
+    inner = [(centre, radius) for centre, radius in inner if radius > 1e-3 * outer[1]]
+    if len(inner) < 2:
+        return
+    angle = np.linspace(0, np.pi, 181)
+    normal = outer[0] - outer[1] * np.cos(angle)
+    height = outer[1] * np.sin(angle)
+    floor = np.zeros_like(normal)
+    for centre, radius in inner:
+        floor = np.maximum(floor, np.sqrt(np.maximum(radius**2 - (normal - centre) ** 2, 0.0)))
+        turn = np.linspace(0, 2 * np.pi, 241)
+        ax.plot(centre + radius * np.cos(turn), radius * np.sin(turn), color=colour, lw=0.6)
+    for sign in (1, -1):
+        ax.fill_between(normal, sign * floor, sign * height, color=colour, alpha=0.12, lw=0)
 
 
 def _draw_limits(ax: Axes, domain: AccessibleDomain) -> None:

@@ -91,7 +91,9 @@ def _fit_view(
     a = np.concatenate([column(series, "a_signed") for series in every])
     ordinate = a * z if scaled else a
     low, high = float(np.nanmin(z)), float(np.nanmax(z))
-    top, bottom = float(np.nanmax(ordinate)), min(float(np.nanmin(ordinate)), 0.0)
-    margin = max(0.07 * (high - low), 0.02)
+    top, bottom = max(float(np.nanmax(ordinate)), 0.0), min(float(np.nanmin(ordinate)), 0.0)
+    margin, tall = max(0.07 * (high - low), 0.02), max(top - bottom, 1e-3)
     ax.set_xlim(low - margin, high + margin)
-    ax.set_ylim(bottom - 0.04 * (top - bottom), bottom + 1.22 * max(top - bottom, 1e-3))
+    # Room for the legend on the side that the paths leave zero to.
+    above, below = (0.22, 0.04) if top >= -bottom else (0.04, 0.22)
+    ax.set_ylim(bottom - below * tall, top + above * tall)

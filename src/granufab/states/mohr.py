@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +21,7 @@ class MohrCircle:
     """Circle (G_n, G_t) of a state; make one with :func:`mohr`.
 
     The angle θ is counted from the symmetry axis: the major direction where a ≥ 0. In 3D the
-    circle is the one through the extreme principal values.
+    circle is the one through the extreme principal values; :attr:`circles` has the two others.
 
     Attributes:
         z: coordination number [-].
@@ -33,6 +34,32 @@ class MohrCircle:
     a: float
     dimension: int = 2
     b: float | None = None
+
+    @classmethod
+    def from_tensor(cls, tensor: ArrayLike) -> Self:
+        """The state of a fabric tensor G, of any principal values and directions.
+
+        z = 2 tr G, a = 2(G_1 − G_2)/tr G in 2D, (5/2)(G_1 − G_3)/tr G in 3D,
+        b = (G_2 − G_3)/(G_1 − G_3) in 3D (0 where G is isotropic).
+
+        Args:
+            tensor: G = (z/2) F [-], symmetric, shape (D, D).
+        Raises:
+            InvalidSettings: not a symmetric 2×2 or 3×3 tensor with values ≥ 0 and a trace > 0.
+        """
+        values = np.asarray(tensor, dtype=np.float64)
+        if values.shape not in ((2, 2), (3, 3)) or not np.allclose(values, values.T, atol=1e-9):
+            raise InvalidSettings(f"G has shape {values.shape}, must be symmetric, 2×2 or 3×3")
+        principal = np.linalg.eigvalsh(values)[::-1]
+        trace, spread = float(principal.sum()), float(principal[0] - principal[-1])
+        if not trace > 0.0 or principal[-1] < -1e-12 * trace:
+            raise InvalidSettings(
+                f"G has the principal values {principal.tolist()}, none may be negative"
+            )
+        if len(values) == 2:
+            return cls(z=2.0 * trace, a=2.0 * spread / trace)
+        b = float(principal[1] - principal[2]) / spread if spread > 1e-14 * trace else 0.0
+        return cls(z=2.0 * trace, a=2.5 * spread / trace, dimension=3, b=b)
 
     @property
     def p_G(self) -> float:
@@ -65,6 +92,27 @@ class MohrCircle:
     def G_D(self) -> float:
         """Smallest principal value [-]."""
         return min(self._along, self._across)
+
+    @property
+    def principal(self) -> tuple[float, ...]:
+        """The D principal values G_1 ≥ … ≥ G_D [-]."""
+        if self.dimension == 2:
+            return self.G_1, self.G_D
+        return self.G_1, 0.5 * self.z - self.G_1 - self.G_D, self.G_D
+
+    @property
+    def circles(self) -> tuple[tuple[float, float], ...]:
+        """Centre and radius [-] of each circle, the largest first: one in 2D, three in 3D.
+
+        In 3D those through G_1 and G_3, G_1 and G_2, G_2 and G_3: the projections of G on all
+        planes lie within the first and outside the other two. In axisymmetric states one of
+        them is a point.
+        """
+        values = self.principal
+        pairs = ((0, 1),) if self.dimension == 2 else ((0, 2), (0, 1), (1, 2))
+        return tuple(
+            (0.5 * (values[i] + values[j]), 0.5 * (values[i] - values[j])) for i, j in pairs
+        )
 
     @property
     def centre(self) -> float:

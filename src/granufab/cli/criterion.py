@@ -1,0 +1,103 @@
+"""``granufab criterion``: z, a and az of a run against what counts as a contact."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+
+import typer
+
+from granufab.errors import InvalidSettings
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from granufab.history import Run
+
+__all__ = ["criterion"]
+
+Definition = Literal["z", "z_backbone", "z_mechanical"]
+QUANTITIES = ("z", "a", "az", "rattler_fraction")
+HEADER = ("threshold", "z", "±", "a", "±", "az", "±", "rattlers", "±")
+KINDS = {"force": "normal force above [mean normal forces]", "gap": "gap below [mean diameters]"}
+
+
+def criterion(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run file.")],
+    frame: Annotated[
+        int, typer.Option(metavar="K", help="State, or the last of the window; default the last.")
+    ] = -1,
+    window: Annotated[
+        float,
+        typer.Option(metavar="STRAIN", help="Average the frames of this ∫|dε_q| before it."),
+    ] = 0.0,
+    z_definition: Annotated[
+        Definition | None, typer.Option(help="Which z; default the run's own.")
+    ] = None,
+    bootstrap: Annotated[
+        int, typer.Option(metavar="N", help="Resamples for the errors of one state; 0 for none.")
+    ] = 200,
+    json: Annotated[bool, typer.Option("--json", help="JSON on standard output.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Also draw the curves.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace FILE if it exists.")] = False,
+) -> None:
+    """Curves of z, a and az against a force and a gap threshold, with error bars."""
+    from granufab.cli.output import print_json, print_rows
+    from granufab.fabric import criterion_curves
+    from granufab.io import read
+
+    if output is not None:
+        _check_output(output, force)
+    if bootstrap < 0:
+        raise InvalidSettings(f"--bootstrap {bootstrap}: must be >= 0")
+    loaded = read(run)
+    curves = criterion_curves(
+        loaded, frame=frame, window=window, z_definition=z_definition, bootstrap=bootstrap
+    )
+    entry = _entry(run, loaded, frame, window, curves)
+    if json:
+        print_json(entry)
+    else:
+        for kind in (k for k in KINDS if k in entry):
+            title = f"{run}; {KINDS[kind]}; {curves.attrs['z_definition']}"
+            names = ["threshold", *(f"{n}{e}" for n in QUANTITIES for e in ("", "_error"))]
+            print_rows(title, HEADER, zip(*(entry[kind][name] for name in names), strict=True))
+    if curves.attrs["missing"]:
+        print(f"granufab: {run}: {curves.attrs['missing']}", file=sys.stderr)
+    if output is not None:
+        from granufab.plots import criterion_curves as draw
+
+        cast("Figure", draw(curves)[0].figure).savefig(output, dpi=300)
+
+
+def _check_output(output: Path, force: bool) -> None:
+    if output.suffix.lower() not in (".pdf", ".png", ".svg"):
+        raise InvalidSettings(f"-o {output}: the name must end in .pdf, .png or .svg")
+    if output.exists() and not force:
+        raise InvalidSettings(f"{output}: exists already; choose another name, or --force")
+    if not output.parent.is_dir():
+        raise InvalidSettings(f"{output}: there is no folder {output.parent}")
+
+
+def _entry(source: Path, run: Run, frame: int, window: float, curves: xr.Dataset) -> dict[str, Any]:
+    """The curves as plain lists, one object per kind of threshold."""
+    entry: dict[str, Any] = {
+        "source": str(source),
+        "frame": frame % len(run.frames),
+        "eps_q": run.frames[frame].eps_q,
+        "window": window,
+        **{name: curves.attrs[name] for name in ("z_definition", "minimum_contacts")},
+        **{name: curves.attrs[name] for name in ("anisotropy", "state_count", "error_bars")},
+    }
+    for kind in KINDS:
+        if f"z_{kind}" not in curves:
+            continue
+        entry[kind] = {"threshold": curves[f"{kind}_threshold"].values.tolist()}
+        for name in QUANTITIES:
+            for error in ("", "_error"):
+                entry[kind][f"{name}{error}"] = curves[f"{name}_{kind}{error}"].values.tolist()
+    return entry
