@@ -32,6 +32,19 @@ def test_a_criterion_reads_back_its_own_words(gap):
     assert parse_criterion(parse_criterion(f"gap:{gap!r}").text) == parse_criterion(f"gap:{gap!r}")
 
 
+@given(st.floats(0, 10))
+def test_a_force_criterion_reads_back_its_share(share):
+    assert parse_criterion(f"force:{share!r}").share == share
+    assert parse_criterion(parse_criterion(f"force:{share!r}").text).share == share
+
+
+def test_the_share_of_a_force_criterion_moves_the_threshold():
+    packing = row([0.0, 0.0, 0.0, 0.0], [1.0, 3.0, 0.02, -0.5])
+    # The mean over pushing contacts is 1.34; a pulling one counts by its size.
+    for share, kept in ((0.02, [0, 1, 3]), (0.5, [0, 1]), (1.0, [1]), (3.0, [])):
+        assert select_contacts(packing, f"force:{share}").pair[:, 0].tolist() == kept
+
+
 def test_force_and_listed_read_back():
     assert [parse_criterion(text).text for text in ("force", " listed ", "gap:0.015")] == [
         "force",
@@ -40,7 +53,10 @@ def test_force_and_listed_read_back():
     ]
 
 
-@pytest.mark.parametrize("text", ["forces", "gap", "gap:", "gap:x", "gap:-0.1", "gap:nan", "gap:2"])
+@pytest.mark.parametrize(
+    "text",
+    ["forces", "gap", "gap:", "gap:x", "gap:-0.1", "gap:nan", "gap:2", "force:-1", "force:x"],
+)
 def test_bad_criteria_are_refused_in_one_line(text):
     with pytest.raises(InvalidSettings) as caught:
         parse_criterion(text)

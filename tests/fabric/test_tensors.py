@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 from fabric_cases import (
+    body_centred,
     contacts_of,
     draw_plane,
     draw_sphere,
@@ -38,7 +39,13 @@ def rotation(angle):
 
 @pytest.mark.parametrize(
     ("packing", "z"),
-    [(hexagonal(), 6), (square(), 4), (face_centred(), 12), (lattice(np.eye(3)), 6)],
+    [
+        (hexagonal(), 6),
+        (square(), 4),
+        (face_centred(), 12),
+        (body_centred(), 8),
+        (lattice(np.eye(3)), 6),
+    ],
 )
 def test_lattices_have_their_z_and_are_isotropic_at_second_order(packing, z):
     values = measure(packing, criterion="gap:0.01")
@@ -67,6 +74,68 @@ def test_the_fourth_order_tensor_of_cubic_lattices():
     assert faces[0, 0, 1, 1] == pytest.approx(1 / 12)
     assert np.einsum("iijj", faces) == pytest.approx(1.0)
     np.testing.assert_allclose(np.einsum("ijkk", faces), np.eye(3) / 3, atol=1e-12)
+
+
+STARS = {
+    "square": (square(), np.eye(2)),
+    "hexagonal": (hexagonal(), [[1, 0], [0.5, np.sqrt(0.75)], [-0.5, np.sqrt(0.75)]]),
+    "SC": (lattice(np.eye(3), 3), np.eye(3)),
+    "BCC": (body_centred(), [[1, s, t] for s in (1, -1) for t in (1, -1)]),
+    "FCC": (face_centred(), [np.roll([1, s, 0], k) for s in (1, -1) for k in range(3)]),
+}
+
+
+@pytest.mark.parametrize("name", STARS)
+def test_lattices_have_exactly_the_tensors_of_their_star(name):
+    packing, star = STARS[name]
+    star = np.array(star, dtype=float)
+    star /= np.linalg.norm(star, axis=1)[:, None]
+    contacts = neighbours_within(packing, 0.01)
+    assert contacts.count == len(star) * packing.grains.count
+    dimension = packing.dimension
+    np.testing.assert_allclose(fabric_tensor(contacts), np.eye(dimension) / dimension, atol=1e-12)
+    wanted = np.mean([np.multiply.outer(np.outer(n, n), np.outer(n, n)) for n in star], axis=0)
+    np.testing.assert_allclose(fourth_order_tensor(contacts), wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("dimension", "a"), [(2, 0.0), (2, 0.4), (2, 0.9), (3, -0.4), (3, 0.0), (3, 0.6)]
+)
+def test_many_draws_scatter_about_their_anisotropy_by_the_noise_floor(dimension, a):
+    generator, draws, count = np.random.default_rng(11), 500, 200
+    axis = np.array([np.cos(0.7), np.sin(0.7)] if dimension == 2 else [0.6, 0.0, 0.8])
+    normal = (
+        draw_plane(draws * count, a, 0.7, generator)
+        if dimension == 2
+        else draw_sphere(draws * count, a, axis, generator)
+    )
+    found = [
+        signed_anisotropy(fabric_tensor(n), axis) for n in normal.reshape(draws, count, dimension)
+    ]
+    pull = (np.array(found) - a) / anisotropy_noise(count, dimension, a)
+    assert abs(pull.mean()) < 3.5 / np.sqrt(draws)
+    # χ² of 500 degrees of freedom has the spread √1000.
+    assert abs((pull**2).sum() - draws) < 4 * np.sqrt(2 * draws)
+    assert (np.abs(pull) > 3).mean() < 0.015
+
+
+@given(seed=st.integers(0, 10**6))
+@settings(max_examples=30)
+def test_two_axes_give_the_unsigned_anisotropy_of_a_true_triaxial_state(seed):
+    generator = np.random.default_rng(seed)
+    for dimension in (2, 3):
+        values = np.sort(generator.dirichlet(np.ones(dimension)))[::-1]
+        turn = np.linalg.qr(generator.normal(size=(dimension, dimension)))[0]
+        fabric = turn @ np.diag(values) @ turn.T
+        major, minor = 3.0 * turn[:, 0], -0.5 * turn[:, -1]
+        signed = signed_anisotropy(fabric, major, minor=minor)
+        assert signed == pytest.approx(anisotropy(fabric), abs=1e-12)
+        assert signed_anisotropy(fabric, minor, minor=major) == pytest.approx(-signed, abs=1e-12)
+    # About an axis of symmetry one axis says the same as two.
+    round_ = turn @ np.diag([values[0], *[(1 - values[0]) / 2] * 2]) @ turn.T
+    assert signed_anisotropy(round_, turn[:, 0], minor=turn[:, 1]) == pytest.approx(
+        signed_anisotropy(round_, turn[:, 0]), abs=1e-12
+    )
 
 
 @pytest.mark.parametrize(("a", "degrees"), [(0.3, 72.0), (0.8, 170.0), (0.05, 5.0)])

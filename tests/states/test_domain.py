@@ -222,3 +222,41 @@ def test_domain_is_frozen() -> None:
     domain: Any = AccessibleDomain(z_min=3, z_max=4)
     with pytest.raises(FrozenInstanceError):
         domain.z_min = 2.0
+
+
+@pytest.mark.parametrize(
+    ("case", "z_star", "a_star", "slopes"),
+    [
+        ({"dimension": 2}, 5.0, 2 / 5, (2, 2)),
+        ({"dimension": 3}, 14 / 3, 5 / 14, (5 / 2, 5 / 4)),
+        ({"dimension": 3, "mode": "extension"}, 16 / 3, 5 / 16, (5 / 4, 5 / 2)),
+        ({"dimension": 3, "b": 0.5}, 5.0, 1 / 3, (5 / 3, 5 / 3)),
+    ],
+    ids=["2D", "compression", "extension", "b = 1/2"],
+)
+def test_every_row_of_the_table_between_four_and_six(
+    case: dict[str, Any], z_star: float, a_star: float, slopes: tuple[float, float]
+) -> None:
+    domain = AccessibleDomain(z_min=4, z_max=6, **case)
+    assert (domain.z_star, domain.a_star) == pytest.approx((z_star, a_star), rel=1e-12)
+    assert domain.slopes == pytest.approx(slopes, rel=1e-12)
+    z = np.array([4.2, 5.0, 5.7])
+    assert domain.loss_saturation(z) == pytest.approx(slopes[0] * (1 - 4 / z), rel=1e-12)
+    assert domain.gain_saturation(z) == pytest.approx(slopes[1] * (6 / z - 1), rel=1e-12)
+    # In (z, az): straight, rising from z_min with the one slope, falling to z_max with the other.
+    assert domain.loss_line(z) == pytest.approx(slopes[0] * (z - 4), rel=1e-12)
+    assert domain.gain_line(z) == pytest.approx(slopes[1] * (6 - z), rel=1e-12)
+
+
+@given(z=st.floats(2.0, 8.0), a=st.floats(0.01, 1.0))
+def test_the_inverse_is_the_closed_form_of_its_loading(z: float, a: float) -> None:
+    for case, low, high in (
+        ({"dimension": 2}, z * (1 - a / 2), z * (1 + a / 2)),
+        ({"dimension": 3}, z * (1 - 2 * a / 5), z * (1 + 4 * a / 5)),
+        ({"dimension": 3, "mode": "extension"}, z * (1 - 4 * a / 5), z * (1 + 2 * a / 5)),
+    ):
+        keywords: dict[str, Any] = case
+        domain = AccessibleDomain.from_critical(z, a, **keywords)
+        assert (domain.z_min, domain.z_max) == pytest.approx((low, high), rel=1e-12)
+        # The sign of a' does not matter to the inverse.
+        assert AccessibleDomain.from_critical(z, -a, **keywords) == domain

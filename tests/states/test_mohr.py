@@ -11,7 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from granufab.errors import InvalidSettings
-from granufab.states import AccessibleDomain, critical_circle, limit_circles, mohr, tangent_line
+from granufab.states import (
+    AccessibleDomain,
+    MohrCircle,
+    critical_circle,
+    limit_circles,
+    mohr,
+    tangent_line,
+)
 
 THETA = np.linspace(0.0, math.pi, 37)
 
@@ -104,3 +111,65 @@ def test_tangent_angle_in_terms_of_the_critical_anisotropy() -> None:
 def test_impossible_state_is_refused(arguments: tuple[Any, ...], says: str) -> None:
     with pytest.raises(InvalidSettings, match=says):
         mohr(*arguments)
+
+
+@given(z=st.floats(0.5, 8.0), a=st.floats(-1.25, 2.5))
+def test_the_axisymmetric_points_are_the_formula(z: float, a: float) -> None:
+    p, q = z / 6, z * a / 15
+    normal, tangential = mohr(z, a, dimension=3).points(THETA)
+    assert np.allclose(normal, p + q * (3 * np.cos(THETA) ** 2 - 1), atol=1e-12)
+    assert np.allclose(tangential, 1.5 * q * np.sin(2 * THETA), atol=1e-12)
+
+
+@given(seed=st.integers(0, 10**6))
+def test_a_tensor_in_any_frame_gives_back_its_state(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    for dimension in (2, 3):
+        values = np.sort(generator.uniform(0.1, 1.5, dimension))[::-1]
+        turn = np.linalg.qr(generator.normal(size=(dimension, dimension)))[0]
+        circle = MohrCircle.from_tensor(turn @ np.diag(values) @ turn.T)
+        assert circle.principal == pytest.approx(values, abs=1e-12)
+        assert circle.z == pytest.approx(2 * values.sum(), abs=1e-12)
+        assert circle.p_G == pytest.approx(values.mean(), abs=1e-12)
+        assert circle.q_G == pytest.approx((values[0] - values[-1]) / dimension, abs=1e-12)
+        if dimension == 3:
+            b = (values[1] - values[2]) / (values[0] - values[2])
+            assert circle.b == pytest.approx(b, abs=1e-9)
+
+
+@given(seed=st.integers(0, 10**6))
+def test_projections_on_all_planes_lie_between_the_three_circles(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    values = generator.uniform(0.1, 1.5, 3)
+    turn = np.linalg.qr(generator.normal(size=(3, 3)))[0]
+    tensor = turn @ np.diag(values) @ turn.T
+    outer, first, second = MohrCircle.from_tensor(tensor).circles
+    m = generator.normal(size=(200, 3))
+    m /= np.linalg.norm(m, axis=1)[:, None]
+    normal = np.einsum("ci,ij,cj->c", m, tensor, m)
+    tangential = np.sqrt(np.maximum(((m @ tensor) ** 2).sum(axis=1) - normal**2, 0))
+    assert (np.hypot(normal - outer[0], tangential) <= outer[1] + 1e-9).all()
+    for centre, radius in (first, second):
+        assert (np.hypot(normal - centre, tangential) >= radius - 1e-9).all()
+
+
+def test_axisymmetric_states_have_one_circle_and_a_point() -> None:
+    for circle, point in ((mohr(4.6, 0.3, 3), 2), (mohr(5.0, -0.2, 3), 1)):
+        (_, outer), *inner = circle.circles
+        assert inner[point - 1][1] == pytest.approx(0.0, abs=1e-12)
+        assert inner[2 - point][1] == pytest.approx(outer)
+    assert mohr(3.4, 0.2).circles == ((pytest.approx(0.85), pytest.approx(0.085)),)
+
+
+@pytest.mark.parametrize(
+    ("tensor", "says"),
+    [
+        (np.eye(4), "symmetric, 2×2 or 3×3"),
+        ([[1.0, 0.2], [0.1, 1.0]], "symmetric, 2×2 or 3×3"),
+        (np.diag([1.0, -0.1]), "none may be negative"),
+        (np.zeros((3, 3)), "none may be negative"),
+    ],
+)
+def test_a_tensor_that_is_no_fabric_is_refused(tensor: Any, says: str) -> None:
+    with pytest.raises(InvalidSettings, match=says):
+        MohrCircle.from_tensor(tensor)

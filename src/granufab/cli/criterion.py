@@ -63,7 +63,7 @@ def criterion(
         print_json(entry)
     else:
         for kind in (k for k in KINDS if k in entry):
-            title = f"{run}; {KINDS[kind]}; {curves.attrs['z_definition']}"
+            title = f"{KINDS[kind]}; {curves.attrs['z_definition']}; {run}"
             names = ["threshold", *(f"{n}{e}" for n in QUANTITIES for e in ("", "_error"))]
             print_rows(title, HEADER, zip(*(entry[kind][name] for name in names), strict=True))
     if curves.attrs["missing"]:
