@@ -27,7 +27,18 @@ PARTS = tuple(
     for quantity in ("z", "az")
     for part in ("before", "after", "gain", "loss", "rotation")
 )
-HEADER = ("frames", "ε_q", "gained", "lost", "persistent", "I+", "I-", "Δz", "Δ(za')", "turned")
+HEADER = (
+    "frames",
+    "ε_q",
+    "gained",
+    "lost",
+    "persistent",
+    "I+",
+    "I-",
+    "Δz",
+    "Δ(za')",
+    "by rotation",
+)
 
 
 def balance(
