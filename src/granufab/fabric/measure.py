@@ -65,6 +65,7 @@ def measure(
     criterion: str | Criterion = "force",
     z_definition: ZDefinition = "z_backbone",
     direction: Array | None = None,
+    minor: Array | None = None,
     minimum: int = 2,
     reach: float | None = None,
     bootstrap: int = 0,
@@ -78,6 +79,7 @@ def measure(
         criterion: ``force``, ``gap:δ`` or ``listed``.
         z_definition: ``z``, ``z_backbone`` or ``z_mechanical``.
         direction: axis of the signed anisotropy, shape (D,); without it ``a_signed`` is None.
+        minor: its axis of least contraction in true triaxial states, shape (D,).
         minimum: fewest contacts that hold a grain.
         reach: as for :func:`~granufab.fabric.select_contacts`.
         bootstrap: number of resampled states for ``z_error`` and ``a_signed_error``; 0 for none.
@@ -108,6 +110,7 @@ def measure(
                 packing, criterion=rule, z_definition=definition, minimum=minimum, reach=reach
             ),
             direction,
+            minor,
         )
     )
     attempt(lambda: {"phi": solid_fraction(packing)})
@@ -163,6 +166,7 @@ def measure_run(
             criterion=rule,
             z_definition=definition,
             direction=frame.direction if direction is None else direction,
+            minor=frame.extension if direction is None else None,
             minimum=fewest,
             reach=_recorded_reach(run),
             bootstrap=bootstrap,
@@ -269,7 +273,9 @@ def _blank(dimension: int) -> dict[str, Value]:
     return dict.fromkeys([*names, "q_over_p", "p", "phi", "contact_count"])
 
 
-def _fabric_values(network: Network, direction: Array | None) -> dict[str, Value]:
+def _fabric_values(
+    network: Network, direction: Array | None, minor: Array | None
+) -> dict[str, Value]:
     numbers, count = network.coordination, network.contacts.count
     values: dict[str, Value] = {
         "z": numbers.z,
@@ -284,7 +290,7 @@ def _fabric_values(network: Network, direction: Array | None) -> dict[str, Value
     enriched = enriched_tensor(fabric, network.z)
     dimension = len(fabric)
     a = anisotropy(fabric)
-    signed = None if direction is None else signed_anisotropy(fabric, direction)
+    signed = None if direction is None else signed_anisotropy(fabric, direction, minor=minor)
     values |= {
         "a": a,
         "a_signed": signed,
