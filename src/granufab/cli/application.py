@@ -6,7 +6,19 @@ from typing import Annotated
 
 import typer
 
-from granufab.cli import balance, criterion, doctor, fit, info, measure, new, plot, reproduce, run
+from granufab.cli import (
+    balance,
+    criterion,
+    doctor,
+    fit,
+    info,
+    measure,
+    new,
+    plot,
+    predict,
+    reproduce,
+    run,
+)
 
 __all__ = ["app"]
 
@@ -25,6 +37,7 @@ app.command("measure")(measure.measure)
 app.command("balance")(balance.balance)
 app.command("criterion")(criterion.criterion)
 app.command("fit")(fit.fit)
+app.command("predict")(predict.predict)
 app.command("plot")(plot.plot)
 app.command("info")(info.info)
 app.command("doctor")(doctor.doctor)

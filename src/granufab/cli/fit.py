@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from granufab.cli.evolution_fit import check_new, fit_law, print_law, write_law
 from granufab.errors import GranufabError, MissingData
 
 if TYPE_CHECKING:
@@ -16,11 +17,12 @@ if TYPE_CHECKING:
 
     from granufab.states import AccessibleFit
 
-__all__ = ["fit", "fit_series", "read_paths"]
+__all__ = ["fit", "fit_series", "known_rows", "read_paths"]
 
 Method = Literal["critical", "envelope", "lines"]
 Mode = Literal["compression", "extension"]
 Definition = Literal["z", "z_backbone", "z_mechanical"]
+Form = Literal["minimal", "early", "shedding", "memory"]
 
 
 def fit(
@@ -41,6 +43,12 @@ def fit(
     b: Annotated[
         float | None, typer.Option(min=0, max=1, help="3D: b of the loading; default as recorded.")
     ] = None,
+    evolution: Annotated[
+        Path | None,
+        typer.Option(metavar="FIT.json", help="Also fit an evolution law, for granufab predict."),
+    ] = None,
+    form: Annotated[Form, typer.Option(help="Which evolution law.")] = "memory",
+    force: Annotated[bool, typer.Option("--force", help="Replace FIT.json if it exists.")] = False,
     json: Annotated[bool, typer.Option("--json", help="JSON on standard output.")] = False,
 ) -> None:
     """Fit z_min, z_max and the critical state, with 95 % intervals.
@@ -51,6 +59,7 @@ def fit(
     from granufab.cli.output import print_json, print_rows
     from granufab.reproduce.report import fit_entry
 
+    check_new(evolution, force)
     paths = [path for file in series for path in read_paths(file)]
     given = {"dimension": dimension, "mode": mode, "b": b}
     found, definition = fit_series(paths, method, z_definition, **given)
@@ -59,6 +68,10 @@ def fit(
         "z_definition": definition,
         "series": [str(file) for file in series],
     }
+    law = None
+    if evolution is not None:
+        law = fit_law(paths, found, definition, form)
+        entry["evolution"] = write_law(law, evolution, entry)
     if json:
         print_json(entry)
         return
@@ -69,6 +82,8 @@ def fit(
         f"outside the fitted domain: {found.outside_fraction:.1%} of the states, "
         f"{found.outside_significant:.1%} by more than their scatter"
     )
+    if law is not None:
+        print_law(law)
 
 
 def fit_series(
@@ -91,7 +106,7 @@ def fit_series(
 
     definition = z_definition or _default_definition(paths)
     stages = [first_stage(path) for path in paths]
-    rows = [_known_rows(stage, definition) for stage in stages]
+    rows = [known_rows(stage, definition) for stage in stages]
     symmetries = [series_symmetry(path).but(dimension=dimension, mode=mode, b=b) for path in paths]
     options = fit_symmetry(symmetries, stages).options()
     strain, z, a = ([row[name] for row in rows] for name in ("eps_q", definition, "a"))
@@ -144,7 +159,7 @@ def _default_definition(paths: Sequence[xr.Dataset]) -> str:
     return "z_backbone" if all("z_backbone" in path for path in paths) else "z"
 
 
-def _known_rows(path: xr.Dataset, definition: str) -> dict:
+def known_rows(path: xr.Dataset, definition: str) -> dict:
     """The rows where strain, z and a are known; a is the signed one where the series has it."""
     import numpy as np
 
