@@ -70,6 +70,19 @@ def test_contacts_are_found_again_across_a_remap(sheared: Run) -> None:
     assert remapped == 1
 
 
+def test_images_follow_from_the_branches_where_they_are_not_listed(sheared: Run) -> None:
+    first, second = sheared.frames[9:11]
+    bare = []
+    for frame in (first, second):
+        contacts = frame.packing.contacts
+        assert contacts is not None
+        without = replace(frame.packing, contacts=replace(contacts, image=None))
+        bare.append(replace(frame, packing=without))
+    data, same = balance(first, second), balance(*bare)
+    for name in ("gain", "loss", "current"):
+        np.testing.assert_array_equal(data[name], same[name])
+
+
 def test_the_mean_flow_does_not_see_the_remap(sheared: Run) -> None:
     for first, second in pairwise(sheared.frames):
         gradient = _mean_gradient(first, second)

@@ -193,6 +193,7 @@ def rates_by_sampling(
     """
     followed = follow_run(run, criterion=criterion, z_definition=z_definition, keep=keep)
     rows: list[dict[str, float]] = []
+    attributes: dict = {}
     last: MissingData | None = None
     for every in sorted(set(multiples)):
         try:
@@ -204,7 +205,7 @@ def rates_by_sampling(
             last = error
             continue
         rows.append(_sampled(data, part, every, window))
-        attributes = data.attrs
+        attributes = dict(data.attrs)
     if not rows:
         raise last or MissingData("no sampling strain is asked for; give multiples such as 1, 2, 5")
     table = {

@@ -98,15 +98,11 @@ class IdentifiedContacts:
         """These contacts and those that only ``other``, of the same state, holds."""
         new = np.ones(other.count, dtype=bool)
         new[persistent(self, other)[1]] = False
-        parts = (
-            np.concatenate([mine, theirs[new]])
-            for mine, theirs in (
-                (self.key, other.key),
-                (self.pair, other.pair),
-                (self.normal, other.normal),
-            )
+        return self._with(
+            np.concatenate([self.key, other.key[new]]),
+            np.concatenate([self.pair, other.pair[new]]),
+            np.concatenate([self.normal, other.normal[new]]),
         )
-        return self._with(*parts)
 
     def _with(self, key: IntArray, pair: IntArray, normal: Array) -> IdentifiedContacts:
         return IdentifiedContacts(
@@ -142,8 +138,10 @@ def lattice_changes(states: Sequence[Frame | Packing]) -> list[IntArray]:
     first = packing_of(states[0]).cell
     for state in states[1:]:
         cell = packing_of(state).cell
-        known = first is not None and cell is not None
-        changes.append(_remap(first.matrix, cell.matrix) if known else same)
+        if first is None or cell is None:
+            changes.append(same)
+        else:
+            changes.append(_remap(first.matrix, cell.matrix))
     return changes
 
 
@@ -201,14 +199,10 @@ def _images(packing: Packing, contacts: Contacts) -> IntArray:
         return np.zeros((contacts.count, packing.dimension), dtype=np.int64)
     i, j = contacts.pair.T
     position = packing.grains.position
-    shift = branch_vectors(packing_with(packing, contacts)) - (position[j] - position[i])
+    listed = Packing(grains=packing.grains, contacts=contacts, cell=packing.cell)
+    shift = branch_vectors(listed) - (position[j] - position[i])
     fraction = np.linalg.solve(packing.cell.matrix, shift.T).T
     return np.rint(fraction * np.array(packing.cell.periodic)).astype(np.int64)
-
-
-def packing_with(packing: Packing, contacts: Contacts) -> Packing:
-    """The same state with another list of contacts."""
-    return Packing(grains=packing.grains, contacts=contacts, cell=packing.cell)
 
 
 def _turned(numbers: IntArray, image: IntArray) -> NDArray[np.bool_]:

@@ -73,12 +73,12 @@ class DirectionBins:
     @property
     def edges(self) -> Array:
         """θ of the edges [rad], shape (count + 1,)."""
-        return self._angle(np.arange(self.count + 1) * self.width)
+        return self._angle(np.linspace(0.0, self.count * self.width, self.count + 1))
 
     @property
     def centres(self) -> Array:
         """θ of the middles of the bins [rad], shape (count,)."""
-        return self._angle((np.arange(self.count) + 0.5) * self.width)
+        return self._angle(np.linspace(0.5, self.count - 0.5, self.count) * self.width)
 
     def _angle(self, coordinate: Array) -> Array:
         if self.dimension == 2:

@@ -202,10 +202,10 @@ def _line(
     else:
         value, error = part[name], part[f"{name}_error"].to_numpy()
     strain, rate = _smoothed(part, value.to_numpy(), smooth)
-    _, variance = _smoothed(part, error, 0.0)
-    width = part["strain"].to_numpy()
-    inside = np.maximum(smooth / width, 1.0)
-    band = variance / np.sqrt(inside)
+    _, single = _smoothed(part, error, 0.0)
+    travelled = strain - strain[0]  # the window shrinks towards both ends
+    reach = np.minimum(smooth / 2, np.minimum(travelled, travelled[-1] - travelled))
+    band = single / np.sqrt(1.0 + 2.0 * reach / part["strain"].to_numpy())
     ax.plot(strain, rate, color=colour, label=label if named else None)
     ax.fill_between(strain, rate - band, rate + band, color=colour, alpha=0.2, lw=0)
 
