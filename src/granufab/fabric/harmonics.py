@@ -61,8 +61,8 @@ def sphere_orientation(
     F′ the deviator of the fabric tensor, 4a²/5 in an axisymmetric state; A_l²/(2l + 1) with the
     A_l of :func:`~granufab.fabric.orientation` where the fabric is axisymmetric. N independent
     contacts add (2l + 1 − S_l)/N on average, so
-    :math:`\hat S_l = [N S_l - (2l+1)]/(N-1)` is free of that bias (it may be negative). Its error is at most a quarter too large where
-    there is no power.
+    :math:`\hat S_l = [N S_l - (2l+1)]/(N-1)` is free of that bias (it may be negative).
+    Its error is on the safe side, up to a quarter too large, where there is no power.
 
     Cells: 3·``rings``² of one area on the hemisphere z ≥ 0, n and −n being one direction.
 
