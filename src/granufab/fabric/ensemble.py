@@ -35,6 +35,7 @@ States = Packing | Frame | Sequence[Packing | Frame]
 """One state or several: packings, or the frames of a run."""
 
 _FEWEST_STATES = 8
+_DRAWS_AT_ONCE = 25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -220,10 +221,13 @@ def resample(sums: Array, replicas: int, seed: int = 0) -> Array:
         seed: of the draws.
     """
     generator, count = np.random.default_rng(seed), len(sums)
-    draws = (
-        np.bincount(generator.integers(0, count, count), minlength=count) for _ in range(replicas)
-    )
-    return np.array([draw @ sums for draw in draws]).reshape(replicas, sums.shape[1])
+    rows = []
+    for first in range(0, replicas, _DRAWS_AT_ONCE):
+        weight = np.empty((min(_DRAWS_AT_ONCE, replicas - first), count))
+        for draw in weight:
+            draw[:] = np.bincount(generator.integers(0, count, count), minlength=count)
+        rows.append(weight @ sums)
+    return np.concatenate(rows)
 
 
 def describe(long_name: str, units: str = "-") -> dict[str, str]:

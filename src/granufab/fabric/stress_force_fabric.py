@@ -148,7 +148,8 @@ def stress_force_fabric(
     stress = np.mean([stress_tensor(packing) for packing in sample.packings], axis=0)
     data: dict = {}
     for name, text in _SCALARS.items():
-        error = float(np.std(spread[name])) if replicas else np.nan
+        with np.errstate(invalid="ignore"):  # a ratio to q is not defined where q is 0
+            error = float(np.std(spread[name])) if replicas else np.nan
         data[name] = ((), float(values[name][0]), describe(text))
         data[f"{name}_error"] = ((), error, describe(f"bootstrap standard error of {name}"))
     force_0, length_0 = float(values["force_0"][0]), float(values["length_0"][0])

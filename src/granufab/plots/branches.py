@@ -34,6 +34,7 @@ def branches(data: xr.Dataset, *, ax: Sequence[Axes] | None = None) -> list[Axes
         panels[0].fill_between(
             length, low, high, step="mid", color=line.get_color(), alpha=0.25, lw=0
         )
+        panels[0].set_xlim(left=length[0] - 0.16 * (length[-1] - length[0]) - 1e-6)
         panels[0].set_ylim(bottom=0.0)
         panels[0].set_xlabel(r"branch length $\ell/\langle\ell\rangle$ [-]")
         panels[0].set_ylabel(r"$\langle\ell\rangle\,P_\ell$ [-]")
@@ -50,6 +51,8 @@ def branches(data: xr.Dataset, *, ax: Sequence[Axes] | None = None) -> list[Axes
             color=COLOURS[0],
         )
         panels[1].plot(theta, data["mean_length_fit"] / mean, color=COLOURS[0])
+        low, high = panels[1].get_ylim()
+        panels[1].set_ylim(low - 0.14 * (high - low), high)
         direction_axis(panels[1], int(data.attrs["dimension"]))
         panels[1].set_ylabel(r"$\langle\ell\rangle(\theta)/\langle\ell\rangle$ [-]")
         letter_panels(panels)

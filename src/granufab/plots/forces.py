@@ -38,7 +38,7 @@ def force_density(
             ax.set_xscale("log")
         for index, (label, data) in enumerate(several.items()):
             colour = COLOURS[index % len(COLOURS)]
-            _points(ax, data, MARKERS[index % len(MARKERS)], colour, label)
+            _points(ax, data, MARKERS[index % len(MARKERS)], colour, label, logarithmic_force)
             _laws(ax, data, colour)
         ax.axvline(1.0, color=FIT, lw=0.7, ls=":", zorder=0.5)
         ax.set_xlabel(r"normal force $f_n/\langle f_n\rangle$ [-]")
@@ -78,6 +78,8 @@ def mobilisation(results: Results, *, ax: Axes | None = None) -> Axes:
                 value, density - error, density + error, step="mid", color=colour, alpha=0.25, lw=0
             )
         ax.set_yscale("log")
+        low, high = ax.get_ylim()
+        ax.set_ylim(10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))
         ax.set_xlim(0.0, 1.0)
         ax.set_xlabel(r"mobilised friction $|f_t|/(\mu f_n)$ [-]")
         ax.set_ylabel("probability density [-]")
@@ -85,9 +87,12 @@ def mobilisation(results: Results, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _points(ax: Axes, data: xr.Dataset, marker: str, colour: str, label: str) -> None:
+def _points(
+    ax: Axes, data: xr.Dataset, marker: str, colour: str, label: str, everything: bool
+) -> None:
     x, density = data["x"].to_numpy(), data["P_force"].to_numpy()
-    shown = density > 0
+    # On a linear abscissa the many bins of weak forces would cover each other.
+    shown = (density > 0) & (everything | (x > 0.05))
     ax.errorbar(
         x[shown],
         density[shown],
@@ -119,4 +124,7 @@ def _laws(ax: Axes, data: xr.Dataset, colour: str) -> None:
     ax.plot(high, strong * beta * np.exp(-beta * (high - 1.0)), **style, ls="--")
     if ax.get_legend_handles_labels()[1] == []:
         text = rf"$\alpha={alpha:.2f}$, $\beta={beta:.2f}$"
-        ax.text(0.05, 0.06, text, transform=ax.transAxes, va="bottom")
+        linear = ax.get_xscale() == "linear"
+        where = {"x": 0.96, "y": 0.94, "ha": "right", "va": "top"}
+        where = where if linear else {"x": 0.05, "y": 0.06, "ha": "left", "va": "bottom"}
+        ax.text(s=text, transform=ax.transAxes, **where)

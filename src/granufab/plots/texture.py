@@ -86,8 +86,8 @@ def occupation(data: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         ax.axhline(1.0, color=FIT, lw=0.8, ls=(0, (4, 3)))
         ax.set_ylim(0.0, 1.1)
         direction_axis(ax, 2 if plane else 3)
-        ax.set_ylabel(r"$\int_{\delta\theta} E$ [contacts]")
-        ax.legend(loc="lower right")
+        ax.set_ylabel(r"$\int_{\delta\theta}\;E\,\mathrm{d}\theta$ [contacts]")
+        ax.legend(loc="upper left", bbox_to_anchor=(0.0, 0.9))
     return ax
 
 
