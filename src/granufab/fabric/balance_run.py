@@ -27,6 +27,7 @@ from granufab.fabric.contact_identity import (
 from granufab.fabric.coordination import ZDefinition, check_definition
 from granufab.fabric.criterion import Criterion, parse_criterion
 from granufab.fabric.direction_bins import DirectionBins
+from granufab.fabric.measure import recorded_reach
 from granufab.history import Run
 from granufab.packing import Array, IntArray, Packing
 
@@ -169,7 +170,7 @@ def follow_run(
         keep=keep,
         z_definition=check_definition(z_definition),
         minimum=minimum,
-        reach=_recorded_reach(run),
+        reach=recorded_reach(run),
     )
     place: list[tuple[float, float, int]] = []
 
@@ -275,11 +276,3 @@ def _error_of(text: Mapping[str, str]) -> dict[str, str]:
 def _section(run: Run, name: str) -> Mapping[str, Any]:
     section = run.settings.get(name, {})
     return section if isinstance(section, Mapping) else {}
-
-
-def _recorded_reach(run: Run) -> float | None:
-    """Gap up to which a run lists every pair [mean diameters]: no more than its search margin."""
-    reach = _section(run, "record").get("reach")
-    if reach is None:
-        return None
-    return min(float(reach), float(_section(run, "solver").get("skin", math.inf)))

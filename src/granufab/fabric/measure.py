@@ -39,7 +39,14 @@ from granufab.fabric.tensors import (
 from granufab.history import SERIES_UNITS, Frame, Run
 from granufab.packing import Array, IntArray, Packing
 
-__all__ = ["measure", "measure_run", "quick_measure", "run_definitions", "values_dataset"]
+__all__ = [
+    "measure",
+    "measure_run",
+    "quick_measure",
+    "recorded_reach",
+    "run_definitions",
+    "values_dataset",
+]
 
 Value = float | str | None
 
@@ -168,7 +175,7 @@ def measure_run(
             direction=frame.direction if direction is None else direction,
             minor=frame.extension if direction is None else None,
             minimum=fewest,
-            reach=_recorded_reach(run),
+            reach=recorded_reach(run),
             bootstrap=bootstrap,
         )
         rows.append(row | _frame_values(frame))
@@ -205,7 +212,7 @@ def run_definitions(
     return rule, definition, minimum
 
 
-def _recorded_reach(run: Run) -> float | None:
+def recorded_reach(run: Run) -> float | None:
     """Gap up to which a run lists every pair [mean diameters]: no more than its search margin."""
     sections = (run.settings.get(name, {}) for name in ("record", "solver"))
     record, solver = (s if isinstance(s, Mapping) else {} for s in sections)
