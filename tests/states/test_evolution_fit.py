@@ -155,5 +155,7 @@ def test_bad_options() -> None:
         fit_evolution(*path, form="best")  # type: ignore[arg-type]
     with pytest.raises(InvalidSettings, match="limits"):
         fit_evolution(*path, limits="guess")  # type: ignore[arg-type]
+    with pytest.raises(InvalidSettings, match="same axis"):
+        fit_evolution(path[0], path[1], -path[2])
     with pytest.raises(InvalidSettings, match="dimension"):
         fit_evolution(*path, dimension=5)

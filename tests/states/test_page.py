@@ -29,3 +29,15 @@ def test_example_fits_a_csv(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     exec(compile(example, PAGE.name, "exec"), names)
     assert names["fit"].z_min.value == pytest.approx(3.0, abs=1e-3)
     assert names["fit"].z_max.value == pytest.approx(3.8, abs=1e-3)
+
+
+def test_example_walks_a_dense_sample_through_a_reversal(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    page = PAGE.with_name("evolution.md")
+    example = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)[0]
+    exec(compile(example, page.name, "exec"), {})
+    peak, last = (float(word) for word in capsys.readouterr().out.split())
+    a_star = 2 * (3.65 - 2.73) / (3.65 + 2.73)
+    assert peak > a_star + 0.03
+    assert last == pytest.approx(-a_star, abs=0.01)

@@ -40,9 +40,10 @@ class EvolutionFit:
         limits: "critical" (z_min, z_max from the late-strain plateau) or "fitted" (with the rest).
         rms: root mean square of the residuals of z, a and az on the fitted paths [-].
         state_count: states fitted (the first of each path is given, not fitted).
-        aic: Akaike's criterion, 2k − 2 ln L for independent normal residuals; only differences
-            between forms on the same paths mean something, and correlated residuals inflate them.
-        bic: the same with k ln n.
+        aic: Akaike's criterion χ² + 2k for independent normal residuals of the plateau's scatter;
+            only differences between forms on the same paths mean something, and the memory of
+            the residuals inflates them.
+        bic: χ² + k ln n, n counting z and a'.
         block_length: states per bootstrap block.
         level: probability of the intervals.
         draws: resampled parameters, columns as in ``parameters``, shape (samples, k).
@@ -216,7 +217,7 @@ def fit_evolution(
     errors = found.errors
     k = len(values)
     count = len(errors["z"])
-    likelihood = -count * sum(math.log(max(np.mean(errors[n] ** 2), 1e-30)) for n in ("z", "a")) / 2
+    misfit = float(found.residuals @ found.residuals)
     return EvolutionFit(
         law=_law(values, dimension),
         parameters={
@@ -227,8 +228,8 @@ def fit_evolution(
         limits=limits,
         rms={name: float(np.sqrt(np.mean(error**2))) for name, error in errors.items()},
         state_count=count,
-        aic=2.0 * k - 2.0 * likelihood,
-        bic=k * math.log(2 * count) - 2.0 * likelihood,
+        aic=misfit + 2.0 * k,
+        bic=misfit + k * math.log(2 * count),
         block_length=found.block_length,
         level=settings.level,
         draws=draws,

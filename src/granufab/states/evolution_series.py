@@ -35,13 +35,11 @@ class StrainPath:
         z: coordination number [-], shape (state_count,).
         a: signed anisotropy a' [-], shape (state_count,).
         stages: strain history through the recorded states, cut where it turns back.
-        first: number of states of the first stage.
     """
 
     z: Array
     a: Array
     stages: tuple[StrainStage, ...]
-    first: int
 
     def walk(self, law: EvolutionLaw, tolerance: float = 1e-7) -> tuple[Array, Array]:
         """z and a' that the law gives from the first state on, at every state."""
@@ -92,10 +90,10 @@ def load_strain_paths(
             raise InvalidSettings(f"path {number} has {len(strain)} states of different strain")
         edges = _turns(strain)
         stages = [_stage(strain[low : high + 1], dimension, b) for low, high in pairwise(edges)]
-        first = edges[1] + 1
-        signs.add(float(np.sign(strain[1] - strain[0])))
-        paths.append(StrainPath(z=z_, a=a_, stages=tuple(stages), first=first))
-        cut.append((strain[:first], z_[:first], a_[:first]))
+        first = slice(edges[1] + 1)
+        signs.add(_sense(strain[first], a_[first], number))
+        paths.append(StrainPath(z=z_, a=a_, stages=tuple(stages)))
+        cut.append((strain[first], z_[first], a_[first]))
     if dimension == 3 and b is None and len(signs) > 1:
         raise InvalidSettings("some paths start in compression, others in extension; fit one kind")
     return _with_limits(tuple(paths), cut, dimension, b, signs, settings)
@@ -127,6 +125,18 @@ def _with_limits(
         limits=limits.value,
         limit_draws=limits.draws,
     )
+
+
+def _sense(strain: Array, a: Array, number: int) -> float:
+    """Sign of the first stage's strain, which its late a' must have too."""
+    sign = float(np.sign(strain[-1] - strain[0]))
+    late = float(a[-(-2 * len(a) // 3) :].mean())
+    if late * sign < 0.0:
+        raise InvalidSettings(
+            f"path {number}: ε_q {'grows' if sign > 0 else 'falls'} while a' goes to {late:.3g}; "
+            "both must count positive for contraction along the same axis"
+        )
+    return sign
 
 
 def _moving(strain: Array, z: Array, a: Array) -> tuple[Array, Array, Array]:
