@@ -15,7 +15,7 @@ from granufab.errors import MissingData
 from granufab.fabric import branches, force_statistics, stress_force_fabric, texture
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fabric"))
-from synthetic_forces import stressed  # noqa: E402
+from synthetic_forces import stressed
 
 OPTIONS = {"criterion": "listed", "z_definition": "z"}
 
@@ -27,7 +27,7 @@ def _packing(dimension: int):
 
 
 def _points(ax, index: int = 0) -> np.ndarray:
-    return np.column_stack(ax.containers[index].lines[0].get_data())
+    return np.column_stack(ax.containers[index].lines[0].get_data()).astype(float)
 
 
 def _draws(ax) -> None:

@@ -96,6 +96,7 @@ class ContactSample:
             "axis": self.axis,
             "axis_origin": self.axis_origin,
             "bootstrap": f"over {unit}, taken as independent",
+            "bin_errors": "contacts taken as independent; states of one path share contacts",
         }
 
 

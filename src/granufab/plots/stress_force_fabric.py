@@ -64,7 +64,7 @@ def stress_force_fabric(data: xr.Dataset, *, ax: Sequence[Axes] | None = None) -
         panels[0].tick_params(labelbottom=False)
         panels[1].axhline(0.0, color=FIT, lw=0.5)
         panels[1].set_ylabel(r"$\langle f_t\rangle/f_0$ [-]")
-        panels[1].legend(loc="best")
+        panels[1].legend(loc="upper right" if dimension == 2 else "upper center")
         direction_axis(panels[1], dimension)
         letter_panels(panels)
     return panels
