@@ -15,9 +15,10 @@ from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.bootstrap import network_errors
 from granufab.fabric.coordination import ZDefinition, check_definition
 from granufab.fabric.criterion import FORCE_FRACTION, Criterion, mean_diameter, normal_force
-from granufab.fabric.measure import measure, run_definitions, values_dataset
+from granufab.fabric.measure import measure, values_dataset
 from granufab.fabric.neighbours import neighbours_within
 from granufab.fabric.network import Network, select_network
+from granufab.fabric.run_definitions import run_definitions
 from granufab.fabric.tensors import anisotropy, fabric_tensor, signed_anisotropy
 from granufab.history import Frame, Run
 from granufab.packing import Array, Packing

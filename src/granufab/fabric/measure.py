@@ -20,7 +20,7 @@ from granufab.fabric.coordination import (
 from granufab.fabric.criterion import Criterion, force_threshold, mean_diameter, parse_criterion
 from granufab.fabric.neighbours import branch_vectors, neighbours_within
 from granufab.fabric.network import Network, select_network
-from granufab.fabric.rattlers import minimum_contacts
+from granufab.fabric.run_definitions import recorded_reach, run_definitions
 from granufab.fabric.stress import solid_fraction, stress_ratio, stress_tensor
 from granufab.fabric.tensors import (
     anisotropy,
@@ -39,14 +39,7 @@ from granufab.fabric.tensors import (
 from granufab.history import SERIES_UNITS, Frame, Run
 from granufab.packing import Array, IntArray, Packing
 
-__all__ = [
-    "measure",
-    "measure_run",
-    "quick_measure",
-    "recorded_reach",
-    "run_definitions",
-    "values_dataset",
-]
+__all__ = ["measure", "measure_run", "quick_measure", "values_dataset"]
 
 Value = float | str | None
 
@@ -187,38 +180,6 @@ def measure_run(
         "dimension": run.dimension,
     }
     return values_dataset(rows, "frame", attributes)
-
-
-def run_definitions(
-    run: Run,
-    criterion: str | Criterion | None = None,
-    z_definition: ZDefinition | None = None,
-    minimum: int | None = None,
-) -> tuple[Criterion, ZDefinition, int]:
-    """Criterion, definition of z and fewest contacts of a held grain: by default the run's own.
-
-    A run without friction holds its grains by D + 1 contacts, any other by 2.
-
-    Raises:
-        InvalidSettings: an unknown criterion or definition.
-    """
-    record, material = (run.settings.get(name, {}) for name in ("record", "material"))
-    record = record if isinstance(record, Mapping) else {}
-    rule = parse_criterion(criterion or record.get("criterion", "force"))
-    definition = check_definition(z_definition or record.get("z_definition", "z_backbone"))
-    if minimum is None:
-        smooth = isinstance(material, Mapping) and material.get("friction") == 0
-        minimum = minimum_contacts("frictionless" if smooth else "frictional", run.dimension)
-    return rule, definition, minimum
-
-
-def recorded_reach(run: Run) -> float | None:
-    """Gap up to which a run lists every pair [mean diameters]: no more than its search margin."""
-    sections = (run.settings.get(name, {}) for name in ("record", "solver"))
-    record, solver = (s if isinstance(s, Mapping) else {} for s in sections)
-    if record.get("reach") is None:
-        return None
-    return min(float(record["reach"]), float(solver.get("skin", math.inf)))
 
 
 def quick_measure(

@@ -1,0 +1,45 @@
+"""What a run says of its own measurement: criterion, definition of z, rattler rule, reach."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from granufab.fabric.coordination import ZDefinition, check_definition
+from granufab.fabric.criterion import Criterion, parse_criterion
+from granufab.fabric.rattlers import minimum_contacts
+from granufab.history import Run
+
+__all__ = ["recorded_reach", "run_definitions"]
+
+
+def run_definitions(
+    run: Run,
+    criterion: str | Criterion | None = None,
+    z_definition: ZDefinition | None = None,
+    minimum: int | None = None,
+) -> tuple[Criterion, ZDefinition, int]:
+    """Criterion, definition of z and fewest contacts of a held grain: by default the run's own.
+
+    A run without friction holds its grains by D + 1 contacts, any other by 2.
+
+    Raises:
+        InvalidSettings: an unknown criterion or definition.
+    """
+    record, material = (run.settings.get(name, {}) for name in ("record", "material"))
+    record = record if isinstance(record, Mapping) else {}
+    rule = parse_criterion(criterion or record.get("criterion", "force"))
+    definition = check_definition(z_definition or record.get("z_definition", "z_backbone"))
+    if minimum is None:
+        smooth = isinstance(material, Mapping) and material.get("friction") == 0
+        minimum = minimum_contacts("frictionless" if smooth else "frictional", run.dimension)
+    return rule, definition, minimum
+
+
+def recorded_reach(run: Run) -> float | None:
+    """Gap up to which a run lists every pair [mean diameters]: no more than its search margin."""
+    sections = (run.settings.get(name, {}) for name in ("record", "solver"))
+    record, solver = (s if isinstance(s, Mapping) else {} for s in sections)
+    if record.get("reach") is None:
+        return None
+    return min(float(record["reach"]), float(solver.get("skin", math.inf)))
