@@ -65,7 +65,7 @@ def branches(
         length_bins: of equal width, from the smallest to the largest length.
         orientation: direction of a contact is that of its ``normal`` or of its ``branch``; the
             same for disks and spheres.
-        axis: shape (D,); default as for :func:`~granufab.fabric.pool_contacts`.
+        axis: shape (D,); default as for :func:`~granufab.fabric.ensemble.pool_contacts`.
         criterion: contact criterion.
         z_definition: the contacts that this z counts are used.
         minimum: fewest contacts that hold a grain.

@@ -64,7 +64,7 @@ def force_statistics(
         bins: over the logarithm of x, and of the mobilisation.
         smallest: lower edge of the first bin of x; weaker contacts are counted in no bin.
         axis: of the signed anisotropies, shape (D,); default as for
-            :func:`~granufab.fabric.pool_contacts`.
+            :func:`~granufab.fabric.ensemble.pool_contacts`.
         criterion: contact criterion; the contacts need forces.
         z_definition: the contacts that this z counts are used.
         minimum: fewest contacts that hold a grain.
