@@ -65,7 +65,8 @@ def texture(
         delta_theta (the quantile), delta_theta_error, delta_theta_geometric,
         delta_theta_geometric_min (worst triplet of the sizes), smallest_angle,
         smallest_excess (of an angle over its own three grains' δθ; ≥ 0 but for overlaps) [rad],
-        z, a (in 3D along the axis), theta_c (2D) [degree], z_steric (2π/δθ in 2D, 2/(1 − cos δθ/2) in 3D), steric_margin (1 − worst occupation).
+        z, a (in 3D along the axis), theta_c (2D) [degree], z_steric (2π/δθ in 2D,
+        2/(1 − cos δθ/2) in 3D), steric_margin (1 − worst occupation).
     Raises:
         MissingData: no contacts, or no grain with two.
         InvalidSettings: bins, quantile or δθ out of range; an unknown criterion or definition.
