@@ -13,7 +13,9 @@ from granufab.fabric.branches import branches
 from granufab.fabric.coordination import Coordination, ZDefinition, coordination
 from granufab.fabric.criterion import Criterion, parse_criterion, select_contacts, wall_support
 from granufab.fabric.criterion_curves import criterion_curves, criterion_sweep
+from granufab.fabric.displacements import mean_motion, nonaffine_displacement
 from granufab.fabric.ensemble import late_frames
+from granufab.fabric.fluctuations import fluctuations
 from granufab.fabric.forces import force_statistics
 from granufab.fabric.harmonics import real_harmonics, sphere_density, sphere_orientation
 from granufab.fabric.homogeneity import homogeneity, local_strain
@@ -22,6 +24,7 @@ from granufab.fabric.neighbours import branch_vectors, neighbours_within
 from granufab.fabric.network import Network, select_network
 from granufab.fabric.orientation import orientation, symmetry_axis
 from granufab.fabric.rattlers import RATTLER_RULES, backbone, minimum_contacts
+from granufab.fabric.spectrum import fluctuation_spectrum
 from granufab.fabric.stress import solid_fraction, stress_ratio, stress_tensor
 from granufab.fabric.stress_force_fabric import anisotropy_stress_ratio, stress_force_fabric
 from granufab.fabric.tensors import (
@@ -40,6 +43,7 @@ from granufab.fabric.tensors import (
     signed_anisotropy,
 )
 from granufab.fabric.texture import texture
+from granufab.fabric.velocity_field import velocity_field
 
 __all__ = [
     "RATTLER_RULES",
@@ -65,6 +69,8 @@ __all__ = [
     "deviatoric_part",
     "enriched_tensor",
     "fabric_tensor",
+    "fluctuation_spectrum",
+    "fluctuations",
     "force_statistics",
     "fourth_order_tensor",
     "homogeneity",
@@ -73,11 +79,13 @@ __all__ = [
     "local_strain",
     "major_angle",
     "major_direction",
+    "mean_motion",
     "mean_part",
     "measure",
     "measure_run",
     "minimum_contacts",
     "neighbours_within",
+    "nonaffine_displacement",
     "orientation",
     "parse_criterion",
     "principal_values",
@@ -95,5 +103,6 @@ __all__ = [
     "stress_tensor",
     "symmetry_axis",
     "texture",
+    "velocity_field",
     "wall_support",
 ]
