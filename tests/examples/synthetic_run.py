@@ -21,16 +21,18 @@ def synthetic_run(
 ) -> Run:
     """z and a' relax to (3.35, 0.24), shifted for other frictions; noise as of N grains."""
     rows = _rows(case)
+    frames = _frames(case, rows)
     if record is not None:
         for row in rows:
             record.row(row)
-        record.frame(_frame(rows[-1], case.sample.seed))
+        for frame in frames:
+            record.frame(frame)
     if progress is not None:
         progress("shear", 0.5)
     attributes = {"path": case.name, "criterion": case.record.criterion}
     return Run(
         series=series_dataset(rows, attributes),
-        frames=[_frame(rows[-1], case.sample.seed)],
+        frames=frames,
         settings=case.model_dump(mode="json"),
         summary=_summary(case, rows),
         name=case.name,
@@ -58,7 +60,11 @@ def failing_run(case: Case, *, record: Any = None, progress: Any = None) -> Run:
 
 def _rows(case: Case) -> list[dict[str, float]]:
     random = np.random.default_rng(
-        [case.sample.seed, sum(case.name.encode()), int(1e3 * case.material.friction)]
+        [
+            case.sample.seed,
+            int(100 * (case.sample.coordination or 0)),
+            int(1e3 * case.material.friction),
+        ]
     )
     noise = 0.35 / math.sqrt(case.sample.grain_count)
     z_star = Z_STAR - 0.25 * (case.material.friction - 0.4)
@@ -127,44 +133,78 @@ def _summary(case: Case, rows: list[dict[str, float]]) -> dict[str, Any]:
     }
 
 
-def _frame(row: dict[str, float], seed: int) -> Frame:
-    packing = honeycomb(seed=seed)
-    return Frame(
-        packing=packing,
-        eps_q=row["eps_q"],
-        eps_q_total=row["eps_q_total"],
-        strain=np.zeros((2, 2)),
-        stage=0,
-        stress=np.eye(2),
-        inertial_number=1e-3,
-        direction=np.array([0.0, 1.0]),
-        statistics=StepStatistics(steps=1),
-    )
+def _frames(case: Case, rows: list[dict[str, float]]) -> list[Frame]:
+    """The lattice before and after; in simple shear also on the way, moving affinely."""
+    dimension, seed = case.sample.dimension, case.sample.seed
+    shear = case.path[0].loading == "simple-shear"
+    direction = np.array([-1.0, 1.0]) / math.sqrt(2) if shear else np.eye(dimension)[1]
+    chosen = rows[::10] if shear else [rows[0], rows[-1]]
+    frames = []
+    for row in chosen:
+        gradient = np.eye(dimension)
+        gradient[0, 1] = row["eps_q"] if shear else 0.0
+        sheared = row["eps_q"] != 0.0 and not shear
+        frames.append(
+            Frame(
+                packing=lattice(dimension, seed=seed, sheared=sheared, gradient=gradient),
+                eps_q=row["eps_q"],
+                eps_q_total=row["eps_q_total"],
+                strain=np.zeros((dimension, dimension)),
+                stage=0,
+                stress=np.eye(dimension),
+                inertial_number=1e-3,
+                direction=direction,
+                statistics=StepStatistics(steps=1),
+            )
+        )
+    return frames
 
 
-def honeycomb(columns: int = 8, rows: int = 8, seed: int = 1) -> Packing:
-    """A triangular lattice of unit disks that touch, in a periodic tilted cell."""
-    u, v = np.array([1.0, 0.0]), np.array([0.5, math.sqrt(0.75)])
-    i, j = (k.ravel() for k in np.meshgrid(np.arange(columns), np.arange(rows), indexing="ij"))
-    number = (i % columns) * rows + (j % rows)
+VECTORS = {
+    2: np.array([[1.0, 0.0], [0.5, math.sqrt(0.75)]]),
+    3: np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0], [1.0, 0.0, 1.0]]) / math.sqrt(2),
+}
+STEPS = {
+    2: ((1, 0), (0, 1), (-1, 1)),
+    3: ((1, 0, 0), (0, 1, 0), (0, 0, 1), (1, -1, 0), (1, 0, -1), (0, 1, -1)),
+}
+
+
+def lattice(
+    dimension: int, *, seed: int = 1, sheared: bool = False, gradient: Any = None
+) -> Packing:
+    """A triangular or face-centred cubic lattice of touching unit grains, in a periodic cell.
+
+    ``sheared``: contacts across the direction of contraction y carry no force, so in 2D z goes
+    from 6 to 4 and a from 0 to 1, in 3D z from 12 to 8 and a from 0 to 5/8.
+    """
+    side, vectors = {2: 8, 3: 4}[dimension], VECTORS[dimension]
+    gradient = np.eye(dimension) if gradient is None else gradient
+    place = np.stack(np.meshgrid(*[np.arange(side)] * dimension, indexing="ij"), axis=-1)
+    place = place.reshape(-1, dimension)
+    shape = (side,) * dimension
+    number = np.arange(len(place))
     pairs, branches = [], []
-    for di, dj in ((1, 0), (0, 1), (-1, 1)):
-        other = ((i + di) % columns) * rows + ((j + dj) % rows)
+    for step in STEPS[dimension]:
+        other = np.ravel_multi_index(tuple(((place + step) % side).T), shape)
         pairs.append(np.stack([number, other], axis=1))
-        branches.append(np.tile(di * u + dj * v, (len(i), 1)))
-    branch = np.concatenate(branches)
-    random = np.random.default_rng(seed)
-    strength = random.exponential(size=(len(branch), 1))
+        branches.append(np.tile(np.array(step) @ vectors, (len(place), 1)))
+    normal = np.concatenate(branches)
+    strength = np.random.default_rng(seed).exponential(size=(len(normal), 1))
+    if sheared:
+        strength = np.where(np.abs(normal[:, 1:2]) < 1e-9, 0.0, strength)
+    moved = normal @ gradient.T
+    unit = moved / np.linalg.norm(moved, axis=1)[:, None]
     return Packing(
-        grains=Grains(position=i[:, None] * u + j[:, None] * v, radius=np.full(len(i), 0.5)),
+        grains=Grains(position=place @ vectors @ gradient.T, radius=np.full(len(place), 0.5)),
         contacts=Contacts(
             pair=np.concatenate(pairs),
-            normal=branch,
-            branch=branch,
-            gap=np.zeros(len(branch)),
-            force=strength * branch,
+            normal=unit,
+            branch=moved,
+            gap=np.linalg.norm(moved, axis=1) - 1.0,
+            force=strength * unit,
         ),
-        cell=Cell(matrix=np.column_stack([columns * u, rows * v])),
+        cell=Cell(matrix=gradient @ (side * vectors.T)),
     )
 
 

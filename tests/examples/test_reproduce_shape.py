@@ -32,6 +32,7 @@ from granufab.reproduce.case_folder import RUN_FILES
 from granufab.reproduce.out_folder import prepare_out_folder
 from granufab.simulate.settings import Case, Sample, load_case
 
+FITTED = ("fig5", "fig6", "fig7", "fig8")
 HERE = Path(__file__).parent
 KEYS = {
     "granufab", "settings", "seed", "criterion", "z_definition", "paths", "fit", "solver",
@@ -49,33 +50,120 @@ def _reproduce(figure: str, out: Path, **options: Any) -> dict[str, Any]:
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[Path, dict[str, Any]]]:
-    root = tmp_path_factory.mktemp("figures")
-    return {name: (root / name, _reproduce(name, root / name)) for name in FIGURES}
+def everything(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any], list[Case]]:
+    """The folder of ``reproduce all``, what it returned, and the cases that were run."""
+    folder = tmp_path_factory.mktemp("figures") / "all"
+    cases: list[Case] = []
+
+    def run(case: Case, **options: Any) -> Any:
+        cases.append(case)
+        return synthetic_run(case, **options)
+
+    return folder, _reproduce("all", folder, run_case=run), cases
 
 
-@pytest.mark.parametrize("figure", FIGURES)
-def test_every_promised_file_is_there(figure: str, results: Any) -> None:
-    folder, result = results[figure]
-    promised = {f"{figure}{end}" for end in (".pdf", ".png", ".json", ".csv")}
+@pytest.fixture(scope="module")
+def results(everything: Any) -> dict[str, Any]:
+    return everything[1]
+
+
+@pytest.fixture(scope="module")
+def single(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """The folder of ``reproduce fig7`` alone, and what it returned."""
+    folder = tmp_path_factory.mktemp("single") / "fig7"
+    return folder, _reproduce("fig7", folder)
+
+
+ENDINGS = (".pdf", ".png", ".json", ".csv")
+
+
+def test_every_promised_file_of_a_figure_is_there(single: Any) -> None:
+    folder, result = single
+    promised = {f"fig7{end}" for end in ENDINGS}
     assert {entry.name for entry in folder.iterdir()} == promised | {"summary.json", "runs"}
-    stored = json.loads((folder / f"{figure}.json").read_text())
+    stored = json.loads((folder / "fig7.json").read_text())
     assert stored == result
-    assert json.loads((folder / "summary.json").read_text()) == {figure: stored}
+    assert json.loads((folder / "summary.json").read_text()) == {"fig7": stored}
     for path in result["paths"]:
+        assert path["runs"] == [f"runs/{path['name']}"]
         files = {entry.name for entry in (folder / "runs" / path["name"]).iterdir()}
         assert files == set(RUN_FILES)
 
 
+def test_every_promised_file_of_all_is_there(everything: Any) -> None:
+    folder, results, _ = everything
+    promised = {f"fig{number}{end}" for number in range(1, 9) for end in ENDINGS}
+    assert {entry.name for entry in folder.iterdir()} == promised | {"summary.json", "runs"}
+    assert json.loads((folder / "summary.json").read_text()) == results
+    for name in FIGURES:
+        assert json.loads((folder / f"{name}.json").read_text()) == results[name]
+        assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert (folder / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+        for path in results[name]["paths"]:
+            for run in path["runs"]:
+                assert {entry.name for entry in (folder / run).iterdir()} == set(RUN_FILES)
+
+
+def test_each_simulation_is_run_once_and_shared(everything: Any) -> None:
+    folder, results, cases = everything
+    bare = [case.model_copy(update={"name": ""}) for case in cases]
+    assert len(set(bare)) == len(bare) == 11
+    assert sorted(case.name for case in cases) == sorted(
+        p.name for p in (folder / "runs").iterdir()
+    )
+    runs = {
+        (name, path["name"]): path["runs"] for name in FIGURES for path in results[name]["paths"]
+    }
+    dense = runs["fig7", "dense"]
+    assert runs["fig6", "dense"] == runs["fig1", "disks"] == runs["fig3", "disks"] == dense
+    assert runs["fig2", "disks"] == dense
+    assert runs["fig6", "loose"] == runs["fig7", "loose"]
+    assert runs["fig1", "spheres"] == runs["fig3", "spheres"]
+    assert runs["fig5", "dense"] != dense
+
+
+def test_all_gives_the_numbers_of_a_single_figure(single: Any, results: Any) -> None:
+    alone, among = single[1], results["fig7"]
+    assert alone["fit"] == among["fit"]
+    for one, two in zip(alone["paths"], among["paths"], strict=True):
+        assert {**one, "runs": None} == {**two, "runs": None}
+
+
+def test_a_figure_that_cannot_be_made_leaves_the_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from granufab.reproduce import engine
+
+    leave = engine._leave
+
+    def without_fig6(recipe: Any, *arguments: Any) -> dict[str, Any]:
+        if recipe.figure == "fig6":
+            raise NotConverged("no plateau")
+        return {} if recipe.figure in FITTED else leave(recipe, *arguments)
+
+    monkeypatch.setattr(engine, "_leave", without_fig6)
+    with pytest.raises(NotConverged, match="fig6: no plateau"):
+        _reproduce("all", tmp_path / "out", grains=50)
+    assert (tmp_path / "out" / "fig1.json").exists()
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["fig6"] == {"error": "no plateau"}
+    prepare_out_folder("all", FIGURES, tmp_path / "out")  # counts as ours: may be replaced
+    assert list((tmp_path / "out").iterdir()) == []
+
+
 @pytest.mark.parametrize("figure", FIGURES)
 def test_the_json_has_the_promised_keys(figure: str, results: Any) -> None:
-    result = results[figure][1]
+    result = results[figure]
     assert set(result) >= KEYS
     assert set(result["solver"]) >= SOLVER_KEYS
     assert all(result["solver"][key] is not None for key in SOLVER_KEYS)
-    assert list(result["fit"]) == ["default", "envelope", "lines"]
-    assert result["fit"]["default"]["method"] == "critical"
-    for fit in result["fit"].values():
+    if figure in FITTED:
+        assert list(result["fit"]) == ["default", "envelope", "lines"]
+        assert result["fit"]["default"]["method"] == "critical"
+    else:
+        assert result["fit"] is None
+        assert result["fit_reason"]
+    for fit in (result["fit"] or {}).values():
         for name in ("z_min", "z_max"):
             assert fit[name]["low"] <= fit[name]["value"] <= fit[name]["high"]
     for path in result["paths"]:
@@ -86,7 +174,7 @@ def test_the_json_has_the_promised_keys(figure: str, results: Any) -> None:
 
 @pytest.mark.parametrize("figure", ["fig5", "fig6", "fig7"])
 def test_the_fit_gives_back_the_critical_state(figure: str, results: Any) -> None:
-    result = results[figure][1]
+    result = results[figure]
     fit = result["fit"]["default"]
     assert fit["z_min"]["value"] == pytest.approx(Z_STAR * (1 - A_STAR / 2), abs=0.02)
     assert fit["z_max"]["value"] == pytest.approx(Z_STAR * (1 + A_STAR / 2), abs=0.02)
@@ -96,16 +184,16 @@ def test_the_fit_gives_back_the_critical_state(figure: str, results: Any) -> Non
 
 
 def test_paths_start_where_the_paper_says(results: Any) -> None:
-    starts = {name: [p["z_0"] for p in r["paths"]] for name, (_, r) in results.items()}
+    starts = {name: [p["z_0"] for p in r["paths"]] for name, r in results.items()}
     assert starts["fig5"] == [4.0, 3.3]
     assert starts["fig7"] == starts["fig6"] == [3.7, 3.1]
     assert starts["fig8"] == [3.72] * 5
-    grains = {name: r["settings"]["grain_count"] for name, (_, r) in results.items()}
-    assert grains == {"fig5": 5000, "fig6": 5000, "fig7": 5000, "fig8": 13000}
+    grains = {name: r["settings"]["grain_count"] for name, r in results.items()}
+    assert grains == dict.fromkeys(FIGURES[:7], 5000) | {"fig8": 13000}
 
 
-def test_the_series_file_holds_every_path(results: Any) -> None:
-    folder, result = results["fig5"]
+def test_the_series_file_holds_every_path(everything: Any) -> None:
+    folder, result = everything[0], everything[1]["fig5"]
     with (folder / "fig5.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert list(rows[0]) == ["path", *SERIES_UNITS]
@@ -117,8 +205,46 @@ def test_the_series_file_holds_every_path(results: Any) -> None:
     assert float(rows[300]["eps_q_total"]) == pytest.approx(0.6)
 
 
+def test_fig1_and_fig3_look_at_a_plane_and_a_solid_state(results: Any) -> None:
+    states = results["fig1"]["states"]
+    assert [states[name]["dimension"] for name in ("disks", "spheres")] == [2, 3]
+    # The synthetic lattices lose the contacts across the contraction: theory by hand.
+    expected = {"disks": ((6.0, 0.0), (4.0, 1.0)), "spheres": ((12.0, 0.0), (8.0, 0.625))}
+    for name, states in results["fig3"]["orientation"].items():
+        for state, (z, a) in zip(("before", "after"), expected[name], strict=True):
+            assert states[state]["z_backbone"] == pytest.approx(z)
+            assert states[state]["a_fitted"] == pytest.approx(a, abs=1e-9)
+            assert abs(states[state]["a_signed"]) == pytest.approx(a, abs=1e-9)
+            shown = states[state]["distribution"]
+            assert len(shown["theta"]) == len(shown["E_error"]) == states[state]["bins"]
+    # Contacts at ±30° of the contraction, which is θ = 0.
+    after = results["fig3"]["orientation"]["disks"]["after"]
+    assert after["theta_c_degrees"] == pytest.approx(0.0, abs=1e-6)
+    filled = np.array(after["distribution"]["theta"])[np.array(after["distribution"]["E"]) > 0]
+    np.testing.assert_allclose(np.degrees(filled), [30.0, 150.0], atol=180 / after["bins"])
+
+
+def test_fig2_tells_the_angles_of_a_real_grain(results: Any) -> None:
+    around = results["fig2"]["environment"]
+    assert around["contacts"] == len(set(around["neighbours"])) == 4
+    assert sorted(around["angle_to_next_degrees"]) == pytest.approx([60, 60, 120, 120])
+    assert around["exclusion_to_next_degrees"] == pytest.approx([60] * 4)  # equal disks
+    assert results["fig2"]["texture"]["delta_theta_geometric_degrees"] == pytest.approx(60)
+    contact = results["fig2"]["contact"]
+    assert contact["branch_length"] == pytest.approx(sum(contact["radii"]))
+    np.testing.assert_allclose(contact["contact_vector"], 0.5 * np.array(contact["branch"]))
+
+
+def test_fig4_finds_the_affine_field_of_an_affine_flow(results: Any) -> None:
+    field = results["fig4"]["velocity_field"]
+    np.testing.assert_allclose(field["rate"], [[0, 1], [0, 0]], atol=1e-9)
+    np.testing.assert_allclose(field["rate_far"], field["rate"], atol=1e-6)
+    share = np.array([value for value in field["normal_share"] if value is not None])
+    np.testing.assert_allclose(share, 1.0, atol=1e-6)
+
+
 def test_fig5_measures_the_dip_and_the_reversal(results: Any) -> None:
-    result = results["fig5"][1]
+    result = results["fig5"]
     dip, turn = result["dip"], result["reversal"]
     assert abs(dip["depth"]["value"]) < 0.03  # the synthetic dense path has none
     assert turn["a_signed_plateau"]["value"] == pytest.approx(-A_STAR, abs=0.02)
@@ -131,12 +257,12 @@ def test_fig5_measures_the_dip_and_the_reversal(results: Any) -> None:
 
 
 def test_fig8_fits_each_friction(results: Any) -> None:
-    fits = results["fig8"][1]["fits"]
+    fits = results["fig8"]["fits"]
     assert [fit["friction"] for fit in fits] == [0.1, 0.3, 0.5, 0.7, 0.9]
     z_star = [fit["z_star"]["value"] for fit in fits]
     expected = [Z_STAR - 0.25 * (fit["friction"] - 0.4) for fit in fits]
     np.testing.assert_allclose(z_star, expected, atol=0.02)
-    chosen = results["fig8"][1]["fit"]["default"]
+    chosen = results["fig8"]["fit"]["default"]
     assert chosen["from"] == "mu0.5"
     assert chosen["z_star"] == fits[2]["z_star"]
 
@@ -176,7 +302,7 @@ def test_quick_changes_the_size_and_not_the_tolerance(
     monkeypatch.chdir(tmp_path)
     quick = reproduce("fig7", quick=True, run_case=synthetic_run, workers=1)
     assert quick["settings"]["grain_count"] == 1000
-    assert quick["solver"]["tolerance"] == results["fig7"][1]["solver"]["tolerance"]
+    assert quick["solver"]["tolerance"] == results["fig7"]["solver"]["tolerance"]
     assert (tmp_path / "granufab-fig7" / "fig7.pdf").stat().st_size > 5000
 
 
@@ -249,13 +375,13 @@ def _ends(group: int, patience: float = 5.0) -> bool:
 
 
 @pytest.fixture
-def earlier(tmp_path: Path, results: Any) -> Path:
+def earlier(tmp_path: Path, single: Any) -> Path:
     """A folder as ``reproduce fig7`` leaves it."""
-    return Path(shutil.copytree(results["fig7"][0], tmp_path / "earlier"))
+    return Path(shutil.copytree(single[0], tmp_path / "earlier"))
 
 
 def test_an_earlier_result_is_replaced(earlier: Path) -> None:
-    assert prepare_out_folder("fig7", earlier) == earlier
+    assert prepare_out_folder("fig7", ["fig7"], earlier) == earlier
     assert list(earlier.iterdir()) == []
 
 
@@ -263,9 +389,9 @@ def test_foreign_files_need_force_and_stay(earlier: Path) -> None:
     (earlier / "notes.txt").write_text("mine")
     before = sorted(earlier.rglob("*"))
     with pytest.raises(InvalidSettings, match=r"notes\.txt.*force"):
-        prepare_out_folder("fig7", earlier)
+        prepare_out_folder("fig7", ["fig7"], earlier)
     assert sorted(earlier.rglob("*")) == before
-    prepare_out_folder("fig7", earlier, force=True)
+    prepare_out_folder("fig7", ["fig7"], earlier, force=True)
     assert [entry.name for entry in earlier.iterdir()] == ["notes.txt"]
 
 
@@ -276,14 +402,14 @@ def test_the_default_folder_is_replaced_but_never_what_is_not_ours(
     default = earlier.rename(tmp_path / "granufab-fig7")
     (default / "notes.txt").write_text("mine")
     (default / "runs" / "dense" / "drawing.svg").write_text("mine")
-    prepare_out_folder("fig7", None)
+    prepare_out_folder("fig7", ["fig7"], None)
     assert sorted(entry.name for entry in default.iterdir()) == ["notes.txt", "runs"]
     assert (default / "runs" / "dense" / "drawing.svg").read_text() == "mine"
 
 
 def test_the_result_of_another_figure_is_foreign(earlier: Path) -> None:
     with pytest.raises(InvalidSettings, match=r"holds fig7"):
-        prepare_out_folder("fig5", earlier)
+        prepare_out_folder("fig5", ["fig5"], earlier)
 
 
 def test_a_runs_folder_of_someone_else_is_not_touched(tmp_path: Path) -> None:
@@ -298,7 +424,7 @@ def test_a_runs_folder_of_someone_else_is_not_touched(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"figure": "fig9"}, "fig9.*known: fig5, fig6, fig7, fig8"),
+        ({"figure": "fig9"}, "fig9.*known: fig1, fig2, .*fig8, all"),
         ({"figure": "fig7", "grains": 0}, "grains must be at least 1, got 0"),
         ({"figure": "fig7", "seeds": 0}, "seeds must be at least 1, got 0"),
         ({"figure": "fig7", "seed": -1}, "seed must be at least 0, got -1"),

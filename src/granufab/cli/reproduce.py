@@ -9,11 +9,11 @@ import typer
 
 __all__ = ["reproduce"]
 
-Figure = Literal["fig5", "fig6", "fig7", "fig8"]
+Figure = Literal["fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "fig7", "fig8", "all"]
 
 
 def reproduce(
-    figure: Annotated[Figure, typer.Argument(help="Figure of Radjai et al. (2012).")],
+    figure: Annotated[Figure, typer.Argument(help="Figure of Radjai et al. (2012), or all.")],
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder; default ./granufab-FIGURE, which is replaced."),
@@ -26,7 +26,10 @@ def reproduce(
         bool, typer.Option("--force", help="Write into a folder that holds other files too.")
     ] = False,
 ) -> None:
-    """Simulate, measure, fit and draw a figure; writes figN.pdf .png .json .csv and run files."""
+    """Simulate, measure, fit and draw a figure, or all: figN.pdf .png .json .csv and run files.
+
+    A simulation that several figures show is run once.
+    """
     from granufab.cli.progress import show_progress
     from granufab.reproduce import reproduce as reproduce_figure
 
@@ -46,29 +49,53 @@ def reproduce(
 
 def _print_summary(figure: str, result: dict[str, Any], folder: Path) -> None:
     from granufab.cli.output import print_pairs, print_rows
-    from granufab.cli.run import solver_pairs
 
-    paths = [
+    results = result if figure == "all" else {figure: result}
+    rows = [(name, *row) for name, one in results.items() for row in _path_rows(one)]
+    header = ("figure", "path", "z_0 wanted", "z_0 reached", "z*", "a*")
+    print_rows("paths", header, rows)
+    fits = [(name, *row) for name, one in results.items() for row in _fit_rows(one)]
+    if fits:
+        print()
+        print_rows("accessible domain", ("figure", "fit", "z_min", "z_max"), fits)
+    print()
+    print_pairs("solver", [*_solver_pairs(results), ("files in", folder)])
+    warnings = {
+        f"warning: {path['name']}: {text}": None
+        for one in results.values()
+        for path in one["paths"]
+        for text in path.get("warnings", ())
+    }
+    for line in warnings:
+        print(line)
+
+
+def _path_rows(result: dict[str, Any]) -> list[tuple]:
+    return [
         (
             *(path[key] for key in ("name", "z_0_wanted", "z_0")),
             *(_interval(path[key]) for key in ("z_star", "a_star")),
         )
         for path in result["paths"]
     ]
-    print_rows(figure, ("path", "z_0 wanted", "z_0 reached", "z*", "a*"), paths)
-    fits = [
+
+
+def _fit_rows(result: dict[str, Any]) -> list[tuple]:
+    return [
         (name, *(_interval(fit.get(key)) for key in ("z_min", "z_max")))
-        for name, fit in result["fit"].items()
+        for name, fit in (result["fit"] or {}).items()
     ]
-    print()
-    print_rows("accessible domain", ("fit", "z_min", "z_max"), fits)
-    print()
-    definitions = [("contact criterion", result["criterion"]), ("z is", result["z_definition"])]
-    pairs = [*definitions, *solver_pairs(result["solver"])]
-    print_pairs("solver", [*pairs, ("wall seconds", result["wall_seconds"]), ("files in", folder)])
-    for path in result["paths"]:
-        for warning in path.get("warnings", ()):
-            print(f"warning: {path['name']}: {warning}")
+
+
+def _solver_pairs(results: dict[str, dict[str, Any]]) -> list[tuple[str, Any]]:
+    """Definitions and, of a single figure, how well it was solved."""
+    from granufab.cli.run import solver_pairs
+
+    *_, last = results.values()
+    pairs = [("contact criterion", last["criterion"]), ("z is", last["z_definition"])]
+    if len(results) == 1:
+        pairs += solver_pairs(last["solver"])
+    return [*pairs, ("wall seconds", last["wall_seconds"])]
 
 
 def _interval(estimate: dict[str, float] | None) -> str | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from granufab.plots.balance import attribution, balance, sampling_rates
 from granufab.plots.branches import branches, branches_joint
 from granufab.plots.criterion_curves import criterion_curves
+from granufab.plots.environment import contact_geometry, grain_environment
 from granufab.plots.evolution import evolution
 from granufab.plots.fluctuations import (
     fluctuation_growth,
@@ -33,6 +34,7 @@ __all__ = [
     "balance",
     "branches",
     "branches_joint",
+    "contact_geometry",
     "criterion_curves",
     "evolution",
     "fluctuation_growth",
@@ -41,6 +43,7 @@ __all__ = [
     "fluctuation_spectrum",
     "fluctuations",
     "force_density",
+    "grain_environment",
     "homogeneity",
     "mobilisation",
     "mohr",

@@ -1,31 +1,30 @@
-"""Follow a recipe: run its paths, fit the accessible states, leave figure, JSON and CSV."""
+"""Follow recipes: run their paths, fit the accessible states, leave figures, JSON and CSV."""
 
 from __future__ import annotations
 
 import json
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from granufab.errors import InvalidSettings, NotConverged
+from granufab.errors import GranufabError, InvalidSettings
 from granufab.history import Run
 from granufab.io import json_text, write_json, write_series
 from granufab.reproduce.case_folder import Progress, RunCase, read_run
 from granufab.reproduce.out_folder import prepare_out_folder
+from granufab.reproduce.plan import independent_seeds, make_plan
+from granufab.reproduce.recipe import Recipe
 from granufab.reproduce.report import fit_all, report
-from granufab.reproduce.workers import Job, nearest_sample, run_jobs
+from granufab.reproduce.workers import Job, run_jobs
 
 __all__ = ["FIGURES", "QUICK_GRAINS", "reproduce"]
 
-FIGURES = ("fig5", "fig6", "fig7", "fig8")
+FIGURES = tuple(f"fig{number}" for number in range(1, 9))
 QUICK_GRAINS = 1000
-SAMPLE_SHARE = 0.2  # of the progress, where the sample is made first
 
 
 def reproduce(
@@ -42,14 +41,14 @@ def reproduce(
     run_case: RunCase | None = None,
     prepare: Callable[..., Any] | None = None,
 ) -> dict[str, Any]:
-    """Simulate and draw one of the paper's figures [Radjai2012, Figs 5–8].
+    """Simulate and draw one of the paper's figures, or all of them [Radjai2012, Figs 1–8].
 
-    Leaves ``figN.pdf figN.png figN.json figN.csv summary.json`` in ``out``, and each path's run
-    in ``out/runs/<path>/``.
+    Leaves ``figN.pdf figN.png figN.json figN.csv summary.json`` in ``out``, and each run in a
+    folder of ``out/runs``. A simulation that several figures show is run once.
 
     Args:
-        figure: fig5, fig6, fig7 or fig8.
-        out: folder; by default ``./granufab-figN``, which may be replaced.
+        figure: fig1 … fig8, or all.
+        out: folder; by default ``./granufab-figN`` (``./granufab-all``), which may be replaced.
         quick: 1000 grains a sample, at the same solver tolerance.
         grains: grains a sample, instead of the figure's own or the quick number.
         seed: of the first sample; with several seeds, the root of independent ones.
@@ -58,38 +57,46 @@ def reproduce(
         workers: processes at a time; by default one per core, at most one per run.
         progress: called with a line of text and the fraction done.
         run_case: what simulates a case; :func:`granufab.simulate.run_case` by default.
-        prepare: what makes a sample that paths share; :func:`granufab.prepare` by default.
+        prepare: what makes a sample that runs share; :func:`granufab.prepare` by default.
     Returns:
-        The content of ``figN.json``.
+        The content of ``figN.json``; of all, by the name of the figure.
     Raises:
         InvalidSettings: unknown figure, bad number, or a folder that must not be written.
-        GranufabError: a path failed; the message names it.
+        GranufabError: a path failed; the message names it. Where one figure of all cannot be
+            made from its runs, the others are left first.
     """
     _check(figure, grains, seed, seeds, workers)
-    recipe = import_module(f"granufab.reproduce.{figure}").RECIPE
-    grain_count = grains if grains is not None else QUICK_GRAINS if quick else recipe.grain_count
-    folder = prepare_out_folder(figure, out, force=force)
+    recipes: dict[str, Recipe] = {
+        name: import_module(f"granufab.reproduce.{name}").RECIPE
+        for name in (FIGURES if figure == "all" else (figure,))
+    }
+    quick_or_own = {n: QUICK_GRAINS if quick else r.grain_count for n, r in recipes.items()}
+    grain_counts = {name: grains or count for name, count in quick_or_own.items()}
+    folder = prepare_out_folder(figure, tuple(recipes), out, force=force)
     began = time.perf_counter()
 
-    jobs = _jobs(recipe, folder, grain_count, _seeds(seed, seeds))
-    every = [job for repeats in jobs.values() for job in repeats]
-    if recipe.one_sample:
-        every = _with_samples(every, prepare, _part(progress, 0.0, SAMPLE_SHARE))
-        progress = _part(progress, SAMPLE_SHARE, 1.0)
-    run_jobs(every, workers=workers, progress=progress, run_case=run_case)
-    runs = {name: [read_run(job.folder) for job in repeats] for name, repeats in jobs.items()}
-
-    outcome = fit_all(recipe, runs, z_definition=every[0].case.record.z_definition)
-    result = report(outcome, cases=[job.case for job in every])
-    result["settings"] = {"figure": figure, "quick": quick, "seeds": seeds, **result["settings"]}
-    result["seed"] = seed
-    result["wall_seconds"] = time.perf_counter() - began
-    return _leave(figure, folder, outcome, result, runs)
+    plan = make_plan(recipes, folder, grain_counts, independent_seeds(seed, seeds))
+    run_jobs(plan.jobs, workers=workers, progress=progress, run_case=run_case, prepare=prepare)
+    results: dict[str, Any] = {}
+    failures: list[GranufabError] = []
+    for name, recipe in recipes.items():
+        asked = {"figure": name, "quick": quick, "seeds": seeds}
+        try:
+            results[name] = _leave(recipe, folder, plan.figures[name], asked, seed, began)
+        except GranufabError as error:
+            if figure != "all":
+                raise
+            failures.append(type(error)(f"{name}: {error}"))
+            results[name] = {"error": str(error)}
+    write_json(results, folder / "summary.json")
+    if failures:
+        raise failures[0]
+    return results if figure == "all" else results[figure]
 
 
 def _check(figure: str, grains: int | None, seed: int, seeds: int, workers: int | None) -> None:
-    if figure not in FIGURES:
-        raise InvalidSettings(f"figure {figure!r} is unknown; known: {', '.join(FIGURES)}")
+    if figure not in (*FIGURES, "all"):
+        raise InvalidSettings(f"figure {figure!r} is unknown; known: {', '.join(FIGURES)}, all")
     for name, value, least in (
         ("grains", grains, 1),
         ("seed", seed, 0),
@@ -100,70 +107,28 @@ def _check(figure: str, grains: int | None, seed: int, seeds: int, workers: int 
             raise InvalidSettings(f"{name} must be at least {least}, got {value}")
 
 
-def _seeds(seed: int, count: int) -> list[int]:
-    if count == 1:
-        return [seed]
-    children = np.random.SeedSequence(seed).spawn(count)
-    return [int(child.generate_state(1)[0]) for child in children]
-
-
-def _jobs(recipe: Any, folder: Path, grain_count: int, seeds: list[int]) -> dict[str, list[Job]]:
-    jobs: dict[str, list[Job]] = {}
-    for index, seed in enumerate(seeds):
-        for path in recipe.paths:
-            name = path.name if len(seeds) == 1 else f"{path.name}-s{index + 1}"
-            case = path.case(grain_count=grain_count, seed=seed, name=name)
-            job = Job(case=case, folder=folder / "runs" / name)
-            jobs.setdefault(path.name, []).append(job)
-    return jobs
-
-
-def _with_samples(
-    jobs: list[Job], prepare: Callable[..., Any] | None, progress: Progress
-) -> list[Job]:
-    """The jobs with their starting samples; jobs of the same sample settings share one."""
-    if prepare is None:
-        from granufab.simulate import prepare as prepare_sample
-
-        prepare = prepare_sample
-    wanted = list(dict.fromkeys(job.case.sample for job in jobs))
-    made = {}
-    for index, sample in enumerate(wanted):
-        tell = _part(progress, index / len(wanted), (index + 1) / len(wanted))
-        try:
-            made[sample] = prepare(sample, progress=tell)
-        except NotConverged as error:
-            nearest = nearest_sample(sample, error)
-            if nearest is None:
-                raise
-            made[sample] = prepare(nearest, progress=tell)
-    return [replace(job, start=made[job.case.sample]) for job in jobs]
-
-
-def _part(progress: Progress | None, low: float, high: float) -> Progress:
-    """Progress over a part of the whole."""
-
-    def tell(text: str, share: float) -> None:
-        if progress is not None:
-            progress(text, low + (high - low) * min(max(share, 0.0), 1.0))
-
-    return tell
-
-
 def _leave(
-    figure: str,
+    recipe: Recipe,
     folder: Path,
-    outcome: Any,
-    result: dict[str, Any],
-    runs: Mapping[str, list[Run]],
+    jobs: Mapping[str, list[Job]],
+    asked: Mapping[str, Any],
+    seed: int,
+    began: float,
 ) -> dict[str, Any]:
+    """Fit, draw and write one figure; returns the content of its JSON file."""
     from granufab.plots import save
 
-    save(outcome.recipe.draw(outcome), folder / figure)
-    write_series(_joined(runs), folder / f"{figure}.csv")
+    runs = {name: [read_run(job.folder) for job in repeats] for name, repeats in jobs.items()}
+    definition = next(iter(jobs.values()))[0].case.record.z_definition
+    outcome = fit_all(recipe, runs, z_definition=definition)
+    save(recipe.draw(outcome), folder / recipe.figure)
+    write_series(_joined(runs), folder / f"{recipe.figure}.csv")
+    result = report(outcome, jobs, folder)
+    result["settings"] = {**asked, **result["settings"]}
+    result["seed"] = seed
+    result["wall_seconds"] = time.perf_counter() - began
     result = json.loads(json_text(result))
-    write_json(result, folder / f"{figure}.json")
-    write_json({figure: result}, folder / "summary.json")
+    write_json(result, folder / f"{recipe.figure}.json")
     return result
 
 

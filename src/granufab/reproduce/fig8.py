@@ -46,6 +46,6 @@ RECIPE = Recipe(
     grain_count=13_000,
     draw=_draw,
     extra=_extra,
-    one_sample=True,
     fit_from="mu0.5",
+    fit_each=True,
 )

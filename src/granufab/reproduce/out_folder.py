@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 from granufab.errors import InvalidSettings
@@ -14,53 +15,57 @@ __all__ = ["prepare_out_folder"]
 FIGURE_ENDINGS = (".pdf", ".png", ".json", ".csv")
 
 
-def prepare_out_folder(figure: str, out: Path | str | None, *, force: bool = False) -> Path:
+def prepare_out_folder(
+    name: str, figures: Sequence[str], out: Path | str | None, *, force: bool = False
+) -> Path:
     """Empty the folder of an earlier result, or refuse; returns the folder, ready for writing.
 
     Only what :func:`granufab.reproduce.reproduce` itself leaves is ever removed.
 
     Args:
-        figure: name of the figure.
-        out: the folder; None is ``./granufab-<figure>``, which may be replaced.
+        name: of the figure, or all.
+        figures: the figures that go there.
+        out: the folder; None is ``./granufab-<name>``, which may be replaced.
         force: write into a folder that holds other things too (they stay).
     Raises:
         InvalidSettings: a given folder holds something else, or cannot be written.
     """
-    folder = Path(f"granufab-{figure}") if out is None else Path(out)
+    folder = Path(f"granufab-{name}") if out is None else Path(out)
     if folder.exists() and not folder.is_dir():
         raise InvalidSettings(f"{folder}: is a file, not a folder; give another --out")
-    foreign = _foreign(folder, figure)
+    foreign = _foreign(folder, figures)
     if foreign and out is not None and not force:
         raise InvalidSettings(
             f"{folder}: holds {foreign[0].name}, which this command did not write; nothing was "
             "changed; choose another --out, or --force to write beside it"
         )
     check_writable(folder)
-    _remove_earlier(folder, figure, foreign)
+    _remove_earlier(folder, foreign)
     return folder
 
 
-def _foreign(folder: Path, figure: str) -> list[Path]:
+def _foreign(folder: Path, figures: Sequence[str]) -> list[Path]:
     if not folder.exists():
         return []
-    return sorted(entry for entry in folder.iterdir() if not _is_ours(entry, figure))
+    return sorted(entry for entry in folder.iterdir() if not _is_ours(entry, figures))
 
 
-def _is_ours(entry: Path, figure: str) -> bool:
-    if entry.name in {figure + ending for ending in FIGURE_ENDINGS}:
+def _is_ours(entry: Path, figures: Sequence[str]) -> bool:
+    if entry.stem in figures and entry.suffix in FIGURE_ENDINGS:
         return entry.is_file()
     if entry.name == "summary.json":
-        return _is_our_summary(entry, figure)
+        return _is_our_summary(entry, figures)
     if entry.name == "runs" and entry.is_dir() and not entry.is_symlink():
         return all(_is_run_folder(item) for item in entry.iterdir())
     return False
 
 
-def _is_our_summary(path: Path, figure: str) -> bool:
+def _is_our_summary(path: Path, figures: Sequence[str]) -> bool:
     try:
-        return list(json.loads(path.read_text(encoding="utf-8"))) == [figure]
+        held = list(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
         return False
+    return held == list(figures)
 
 
 def _is_run_folder(folder: Path) -> bool:
@@ -69,7 +74,7 @@ def _is_run_folder(folder: Path) -> bool:
     return all(item.name in RUN_FILES and item.is_file() for item in folder.iterdir())
 
 
-def _remove_earlier(folder: Path, figure: str, foreign: list[Path]) -> None:
+def _remove_earlier(folder: Path, foreign: list[Path]) -> None:
     for entry in folder.iterdir():
         if entry in foreign:
             continue

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -14,6 +14,8 @@ from granufab.history import Run
 from granufab.packing import Array
 from granufab.simulate.settings import Case, Material, Sample, Stage
 from granufab.states import AccessibleFit
+
+Loading = Literal["constant-mean", "biaxial", "triaxial", "simple-shear", "simple-shear-volume"]
 
 __all__ = ["Outcome", "PathRecipe", "Recipe", "column", "first_stage", "last_stage", "reached_z"]
 
@@ -25,24 +27,38 @@ class PathRecipe:
     Attributes:
         name: name in series, folders and the legend's data.
         label: text of the legend; {z_0} becomes the value that was reached.
-        coordination: wanted z_0 of the isotropic sample [-].
+        coordination: wanted z_0 of the isotropic sample [-], or None.
+        compaction_friction: of the sample where no z_0 is wanted [-].
         friction: µ while the path is followed [-].
-        strains: deviatoric strain of each stage; negative reverses [-].
+        dimension: 2 (disks) or 3 (spheres).
+        loading: of every stage, a name of :class:`granufab.simulate.settings.Stage`.
+        b: (ε̇_2 − ε̇_3)/(ε̇_1 − ε̇_3) in 3D at constant mean stress; None is axisymmetric.
+        strains: deviatoric strain of each stage; negative reverses, or extends in 3D [-].
     """
 
     name: str
-    label: str
-    coordination: float
+    label: str = ""
+    coordination: float | None = None
+    compaction_friction: float = 0.0
     friction: float = 0.4
+    dimension: Literal[2, 3] = 2
+    loading: Loading = "constant-mean"
+    b: float | None = None
     strains: tuple[float, ...] = (0.3,)
 
     def case(self, *, grain_count: int, seed: int, name: str | None = None) -> Case:
         """The case to run, at the default solver settings."""
         return Case(
             name=name or self.name,
-            sample=Sample(grain_count=grain_count, coordination=self.coordination, seed=seed),
+            sample=Sample(
+                grain_count=grain_count,
+                dimension=self.dimension,
+                coordination=self.coordination,
+                friction=self.compaction_friction,
+                seed=seed,
+            ),
             material=Material(friction=self.friction),
-            path=tuple(Stage(loading="constant-mean", strain=strain) for strain in self.strains),
+            path=tuple(Stage(loading=self.loading, strain=e, b=self.b) for e in self.strains),
         )
 
 
@@ -53,9 +69,9 @@ class Outcome:
     Attributes:
         recipe: the recipe that was followed.
         runs: repeats of each path, by the path's name.
-        fits: accessible domain of all paths together, by method.
+        fits: accessible domain of all paths together, by method; none where the recipe has none.
         failures: why a method is not among the fits.
-        path_fits: critical-state fit of each path.
+        path_fits: critical-state fit of each path, where the recipe wants it.
         z_definition: column of the coordination number.
     """
 
@@ -91,8 +107,9 @@ class Recipe:
         grain_count: grains per sample at full size.
         draw: makes the figure.
         extra: further entries of the figure's JSON file.
-        one_sample: every path starts from the same sample, made once.
         fit_from: name of the path whose states alone define the domain; None takes all paths.
+        fit_each: fit each path by itself too.
+        without_fit: why no accessible domain is fitted; empty where one is.
     """
 
     figure: str
@@ -100,8 +117,9 @@ class Recipe:
     draw: Callable[[Outcome], Figure]
     grain_count: int = 5000
     extra: Callable[[Outcome], dict[str, Any]] = field(default=lambda outcome: {})
-    one_sample: bool = False
     fit_from: str | None = None
+    fit_each: bool = False
+    without_fit: str = ""
 
 
 def first_stage(series: xr.Dataset) -> xr.Dataset:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from granufab.errors import GranufabError
 from granufab.history import Run
 from granufab.reproduce.recipe import Outcome, PathRecipe, Recipe, column, first_stage, reached_z
 from granufab.reproduce.symmetry import fit_symmetry, run_symmetry
+from granufab.reproduce.workers import Job
 from granufab.simulate.settings import Case
 from granufab.states import AccessibleFit, CriticalState, Estimate, critical_state
 from granufab.states import fit_accessible_states as fit_states
@@ -26,7 +28,8 @@ METHODS = ("critical", "envelope", "lines")
 
 
 def fit_all(recipe: Recipe, runs: Mapping[str, list[Run]], z_definition: str) -> Outcome:
-    """Fit the domain to all paths together (or to ``recipe.fit_from``) and to each path.
+    """Fit the domain to all paths together (or to ``recipe.fit_from``) and to each path where
+    the recipe wants it.
 
     Only the strain before a reversal is used. A method that the data do not allow is left out,
     save the default one.
@@ -37,14 +40,15 @@ def fit_all(recipe: Recipe, runs: Mapping[str, list[Run]], z_definition: str) ->
     chosen = [recipe.fit_from] if recipe.fit_from else list(runs)
     fits: dict[str, AccessibleFit] = {}
     failures: dict[str, str] = {}
-    for method in METHODS:
+    for method in () if recipe.without_fit else METHODS:
         try:
             fits[method] = fit_runs({k: runs[k] for k in chosen}, z_definition, method)
         except GranufabError as error:
             if method == METHODS[0]:
                 raise
             failures[method] = str(error)
-    path_fits = {name: fit_runs({name: runs[name]}, z_definition) for name in runs}
+    alone = runs if recipe.fit_each else {}
+    path_fits = {name: fit_runs({name: runs[name]}, z_definition) for name in alone}
     return Outcome(
         recipe=recipe,
         runs=runs,
@@ -80,14 +84,36 @@ def _seeds(runs: Mapping[str, Sequence[Run]]) -> list[int] | None:
     return labels if len(set(labels)) > 1 else None
 
 
-def report(outcome: Outcome, cases: Sequence[Case]) -> dict[str, Any]:
+def report(outcome: Outcome, jobs: Mapping[str, Sequence[Job]], folder: Path) -> dict[str, Any]:
     """The content of ``figN.json``, save seed and wall time.
 
     Args:
         outcome: runs and fits.
-        cases: what was run, path by path.
+        jobs: what was run for each path.
+        folder: of the figure; the folders of the runs are told from there.
     """
+    cases = [job.case for repeats in jobs.values() for job in repeats]
     record = cases[0].record
+    paths = []
+    for path in outcome.recipe.paths:
+        folders = [job.folder.relative_to(folder).as_posix() for job in jobs[path.name]]
+        paths.append(_path_entry(outcome, path) | {"runs": folders})
+    return {
+        "granufab": granufab.__version__,
+        "settings": _settings(cases),
+        "seed": None,
+        "criterion": record.criterion,
+        "z_definition": record.z_definition,
+        "paths": paths,
+        **_fit_entries(outcome),
+        "solver": _solver([run for repeats in outcome.runs.values() for run in repeats]),
+        **outcome.recipe.extra(outcome),
+    }
+
+
+def _fit_entries(outcome: Outcome) -> dict[str, Any]:
+    if outcome.recipe.without_fit:
+        return {"fit": None, "fit_reason": outcome.recipe.without_fit}
     fits: dict[str, Any] = {
         method: fit_entry(outcome.fits[method])
         if method in outcome.fits
@@ -97,17 +123,7 @@ def report(outcome: Outcome, cases: Sequence[Case]) -> dict[str, Any]:
     default = fits.pop(METHODS[0])
     if outcome.recipe.fit_from:
         default["from"] = outcome.recipe.fit_from
-    return {
-        "granufab": granufab.__version__,
-        "settings": _settings(cases),
-        "seed": None,
-        "criterion": record.criterion,
-        "z_definition": record.z_definition,
-        "paths": [_path_entry(outcome, path) for path in outcome.recipe.paths],
-        "fit": {"default": default, **fits},
-        "solver": _solver([run for repeats in outcome.runs.values() for run in repeats]),
-        **outcome.recipe.extra(outcome),
-    }
+    return {"fit": {"default": default, **fits}}
 
 
 def estimate(value: Estimate | None) -> dict[str, float] | None:
@@ -160,6 +176,9 @@ def _path_entry(outcome: Outcome, path: PathRecipe) -> dict[str, Any]:
         "a_star": estimate(state.a_star),
         "z_0_wanted": path.coordination,
         "z_0_each": reached,
+        "dimension": path.dimension,
+        "loading": path.loading,
+        "b": path.b,
         "friction": path.friction,
         "compaction_friction": [item.get("compaction_friction") for item in summaries],
         "phi_0": float(np.mean([column(run.series, "phi")[0] for run in runs])),
@@ -174,9 +193,10 @@ def _path_entry(outcome: Outcome, path: PathRecipe) -> dict[str, Any]:
 
 def _warnings(path: PathRecipe, reached: Sequence[float], summaries: Sequence[Any]) -> list[str]:
     texts = {text for item in summaries for text in item.get("warnings", [])}
-    for value in reached:
-        if abs(value - path.coordination) > Z_TOLERANCE:
-            texts.add(f"wanted z_0 = {path.coordination:g}, the nearest reachable is {value:.2f}")
+    wanted = path.coordination
+    if wanted is not None:
+        missed = [value for value in reached if abs(value - wanted) > Z_TOLERANCE]
+        texts |= {f"wanted z_0 = {wanted:g}, the nearest reachable is {v:.2f}" for v in missed}
     return sorted(texts)
 
 

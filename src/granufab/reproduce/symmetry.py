@@ -124,7 +124,7 @@ def fit_symmetry(symmetries: Sequence[Symmetry], series: Sequence[xr.Dataset]) -
     if first.dimension == 2 or first.b is not None:
         return first
     given = zip(symmetries, series, strict=True)
-    modes = {item.mode or _plateau_mode(path) for item, path in given}
+    modes: set[Mode] = {item.mode or _plateau_mode(path) for item, path in given}
     if len(modes) > 1:
         raise InvalidSettings(
             "the paths are of compression and of extension, so they have no common domain; "

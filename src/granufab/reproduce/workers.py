@@ -7,10 +7,11 @@ import os
 import queue
 import signal
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +23,23 @@ from granufab.simulate.settings import Case, Sample
 __all__ = ["Job", "nearest_sample", "run_jobs"]
 
 PATIENCE = 10.0  # seconds that a worker is given to stop by itself
+Prepare = Callable[..., Any]
 LARGEST_FRICTION = 5.0  # of a compaction; z_0 hardly falls beyond it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """A case, the folder it is run into, and the sample it starts from if that is made already."""
+    """A case and the folder it is run into.
+
+    Attributes:
+        case: what is run.
+        folder: where its files go.
+        shared: its starting sample is made once for all jobs of the same sample settings.
+    """
 
     case: Case
     folder: Path
-    start: Any = None
+    shared: bool = False
 
 
 def run_jobs(
@@ -40,8 +48,9 @@ def run_jobs(
     workers: int | None = None,
     progress: Progress | None = None,
     run_case: RunCase | None = None,
+    prepare: Prepare | None = None,
 ) -> None:
-    """Run every job; each leaves its files in its folder.
+    """Run every job, the longest first; each leaves its files in its folder.
 
     Args:
         jobs: what to run.
@@ -49,20 +58,57 @@ def run_jobs(
             the jobs run in this process, one after another.
         progress: called with a line about the running paths and the mean fraction.
         run_case: what simulates a case; it must be importable by the workers.
+        prepare: what makes a shared sample, ``prepare(sample, *, progress)``;
+            :func:`granufab.prepare` by default.
     Raises:
         GranufabError: a job failed; the message names its path, and the others were stopped.
         KeyboardInterrupt: interrupted; every worker has ended.
     """
     if workers is None:
         workers = min(os.cpu_count() or 1, len(jobs))
-    board = _Board([job.case.name for job in jobs], progress)
+    samples = list(dict.fromkeys(job.case.sample for job in jobs if job.shared))
+    names = [f"sample {number + 1}" for number in range(len(samples))]
+    board = _Board([*names, *(job.case.name for job in jobs)], progress)
+    tasks = _Tasks(samples=samples, jobs=sorted(jobs, key=_cost, reverse=True), board=board)
     if workers <= 1:
-        for index, job in enumerate(jobs):
-            _run_one(job, lambda text, share, i=index: board.post(i, text, share), run_case)
-            board.post(index, "done", 1.0)
+        _run_serial(tasks, run_case, prepare)
         return
-    context = multiprocessing.get_context("spawn")
-    _run_parallel(jobs, workers, board, run_case, context)
+    _run_parallel(tasks, workers, run_case, prepare)
+
+
+def _cost(job: Job) -> float:
+    """Rough relative time of a job: grains, steps, and contacts of a grain."""
+    steps = sum(abs(s.strain) / (s.inertial_number or s.rate or 1.0) for s in job.case.path)
+    return job.case.sample.grain_count * steps * (4 if job.case.sample.dimension == 3 else 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Tasks:
+    """Samples and jobs, and the board that shows them in this order."""
+
+    samples: list[Sample]
+    jobs: list[Job]
+    board: _Board
+
+    def place(self, job: Job) -> int:
+        """Where a job stands on the board."""
+        return self.board.names.index(job.case.name, len(self.samples))
+
+    def ready(self, sample: Sample | None) -> list[Job]:
+        """Jobs that can run once a sample is there; None: those that wait for none."""
+        return [job for job in self.jobs if (job.case.sample if job.shared else None) == sample]
+
+
+def _run_serial(tasks: _Tasks, run_case: RunCase | None, prepare: Prepare | None) -> None:
+    made: dict[Sample, Any] = {}
+    for index, sample in enumerate(tasks.samples):
+        made[sample] = _make_sample(sample, partial(tasks.board.post, index), prepare)
+        tasks.board.post(index, "done", 1.0)
+    for job in tasks.jobs:
+        index = tasks.place(job)
+        start = made[job.case.sample] if job.shared else None
+        _run_one(job, start, partial(tasks.board.post, index), run_case)
+        tasks.board.post(index, "done", 1.0)
 
 
 class _Board:
@@ -87,10 +133,25 @@ class _Board:
         self.progress(" · ".join(busy) or "done", sum(self.share) / len(self.share))
 
 
-def _run_one(job: Job, progress: Progress | None, run_case: RunCase | None) -> None:
+def _make_sample(sample: Sample, progress: Progress, prepare: Prepare | None) -> Any:
+    """The sample, or where its z_0 is out of reach the nearest one that is not."""
+    if prepare is None:
+        from granufab.simulate import prepare as prepare_sample
+
+        prepare = prepare_sample
+    try:
+        return prepare(sample, progress=progress)
+    except NotConverged as error:
+        nearest = nearest_sample(sample, error)
+        if nearest is None:
+            raise
+    return prepare(nearest, progress=progress)
+
+
+def _run_one(job: Job, start: Any, progress: Progress | None, run_case: RunCase | None) -> None:
     name = job.case.name
     try:
-        run = _run_or_nearest(job, progress, run_case)
+        run = _run_or_nearest(job, start, progress, run_case)
     except GranufabError as error:
         raise type(error)(f"path {name}: {error}") from None
     except Exception as error:
@@ -99,12 +160,14 @@ def _run_one(job: Job, progress: Progress | None, run_case: RunCase | None) -> N
         raise KeyboardInterrupt
 
 
-def _run_or_nearest(job: Job, progress: Progress | None, run_case: RunCase | None) -> Run:
+def _run_or_nearest(
+    job: Job, start: Any, progress: Progress | None, run_case: RunCase | None
+) -> Run:
     """Run the case; where its z_0 is out of reach, start from the nearest sample that is not."""
 
     def run(case: Case) -> Run:
         return run_into_folder(
-            case, job.folder, force=True, start=job.start, progress=progress, run_case=run_case
+            case, job.folder, force=True, start=start, progress=progress, run_case=run_case
         )
 
     try:
@@ -129,45 +192,59 @@ def nearest_sample(sample: Sample, error: NotConverged) -> Sample | None:
 
 
 def _run_parallel(
-    jobs: Sequence[Job],
-    workers: int,
-    board: _Board,
-    run_case: RunCase | None,
-    context: Any,
+    tasks: _Tasks, workers: int, run_case: RunCase | None, prepare: Prepare | None
 ) -> None:
+    context = multiprocessing.get_context("spawn")
     messages, stop = context.Queue(), context.Event()
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(
         workers, mp_context=context, initializer=_start_worker, initargs=(messages, stop)
     )
-    futures: list[Future[None]] = []
+    futures: dict[Future[Any], int] = {}
+
+    def submit(sample: Sample | None, start: Any) -> None:
+        for job in tasks.ready(sample):
+            place = tasks.place(job)
+            futures[pool.submit(_work, job, start, place, run_case)] = place
+
     try:
-        for index, job in enumerate(jobs):
-            futures.append(pool.submit(_work, job, index, run_case))
-        _follow(futures, messages, board)
+        for place, sample in enumerate(tasks.samples):
+            futures[pool.submit(_work_sample, sample, place, prepare)] = place
+        submit(None, None)
+        _follow(futures, messages, tasks, submit)
     except BaseException:
         stop.set()
-        _end(pool, futures, others)
+        _end(pool, list(futures), others)
         raise
     pool.shutdown()
 
 
-def _follow(futures: Sequence[Future[None]], messages: Any, board: _Board) -> None:
+def _follow(
+    futures: dict[Future[Any], int],
+    messages: Any,
+    tasks: _Tasks,
+    submit: Callable[[Sample | None, Any], None],
+) -> None:
+    """Wait for every task; the jobs of a sample are submitted when it is made."""
     pending = set(futures)
     while pending:
+        known = set(futures)
         done, pending = wait(pending, timeout=0.2, return_when=FIRST_COMPLETED)
-        _drain(messages, board)
+        _drain(messages, tasks.board)
         for future in done:
             try:
-                future.result()
+                made = future.result()
             except BrokenProcessPool:
                 raise GranufabError(
                     "a worker process ended abruptly: out of memory (use fewer grains), killed, "
                     'or started from a script without if __name__ == "__main__": (add it, or '
                     "give workers=1)"
                 ) from None
-            index = futures.index(future)
-            board.post(index, "done", 1.0)
+            place = futures[future]
+            tasks.board.post(place, "done", 1.0)
+            if place < len(tasks.samples):
+                submit(tasks.samples[place], made)
+        pending |= set(futures) - known
 
 
 def _drain(messages: Any, board: _Board) -> None:
@@ -202,7 +279,22 @@ class _Stopped(KeyboardInterrupt):
     """The parent asked this worker to stop."""
 
 
-def _work(job: Job, index: int, run_case: RunCase | None) -> None:
+def _work(job: Job, start: Any, index: int, run_case: RunCase | None) -> None:
+    try:
+        _run_one(job, start, _reporter(index), run_case)
+    except KeyboardInterrupt:
+        raise GranufabError(f"path {job.case.name}: stopped") from None
+
+
+def _work_sample(sample: Sample, index: int, prepare: Prepare | None) -> Any:
+    try:
+        return _make_sample(sample, _reporter(index), prepare)
+    except KeyboardInterrupt:
+        raise GranufabError("sample: stopped") from None
+
+
+def _reporter(index: int) -> Progress:
+    """Tells the parent a few times a second, and learns from it when to stop."""
     last = [0.0]
 
     def report(text: str, share: float) -> None:
@@ -215,7 +307,4 @@ def _work(job: Job, index: int, run_case: RunCase | None) -> None:
         _channel["messages"].put((index, text, share))
 
     report("starting", 0.0)
-    try:
-        _run_one(job, report, run_case)
-    except KeyboardInterrupt:
-        raise GranufabError(f"path {job.case.name}: stopped") from None
+    return report
