@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -16,7 +17,8 @@ from granufab.packing import Array, IntArray
 __all__ = ["fluctuations"]
 
 _WIDEST = 6.0
-_BLOCKS = "spatial blocks of grains, all states together, left out one by one (jackknife)"
+_PARTS = 5
+_ERROR = "the larger of two jackknifes: over spatial blocks of grains and over 5 parts of the path"
 
 
 def fluctuations(
@@ -48,7 +50,9 @@ def fluctuations(
         Over ``window``: strain, msd [d²], relative_rms = √(<|u'|²>/D)/(Δε_q d),
         local_exponent (to the next window). Over ``window``, ``component``: msd_component,
         kurtosis. Over ``window``, ``value``: pdf. Scalar: exponent. All but strain
-        with ``…_error``: spatial blocks of grains (25 in 2D, 27 in 3D) taken as independent.
+        with ``…_error``, by jackknife: over spatial blocks of grains (25 in 2D, 27 in 3D) or
+        over 5 parts of the path, whichever is larger. Motion is correlated over the whole cell
+        in quasistatic shear, so samples differ by more: compare replicas.
     Raises:
         MissingData: a state has no cell, or window 0 no velocities.
         InvalidSettings: too few states for a window, or states at uneven intervals.
@@ -56,7 +60,6 @@ def fluctuations(
     track = follow(states, stage=stage, strain=strain)
     chosen = _windows(track, windows)
     block = spatial_blocks(np.mod(track.place[0], 1.0))
-    blocks, dimension = block_count(track.place.shape[2]), track.place.shape[2]
     edges = np.linspace(-_WIDEST, _WIDEST, bins + 1)
     parts = [_window_sums(track, window, block, edges) for window in chosen]
     sums = {name: np.array([part[name] for part in parts]) for name in parts[0]}
@@ -65,14 +68,15 @@ def fluctuations(
     def values(own: dict[str, Array]) -> dict[str, Array]:
         return _statistics(own, lengths, float(edges[1] - edges[0]))
 
-    best, error = _jackknife(sums, values, blocks)
-    return _dataset(best, error, lengths, chosen, edges).assign_attrs(
+    apart = [_jackknife(sums, values, axis) for axis in (1, 2)]
+    error = {name: np.fmax(value, apart[1][name]) for name, value in apart[0].items()}
+    return _dataset(values(sums), error, lengths, chosen, edges).assign_attrs(
         diameter=track.diameter,
         states=len(track.strain),
         interval=track.interval,
-        dimension=dimension,
+        dimension=track.place.shape[2],
         definition="u' = displacement less affine motion; mean 0 in periodic directions",
-        error_bars=_BLOCKS,
+        error_bars=_ERROR,
     )
 
 
@@ -114,31 +118,39 @@ def samples(track: Track, window: int) -> list[tuple[int, int, Array]]:
 
 
 def _window_sums(track: Track, window: int, block: IntArray, edges: Array) -> dict[str, Array]:
-    """Sums over the grains of each block: count, squares, fourth powers, histogram."""
-    blocks = block_count(track.place.shape[2])
-    moved = np.array([u for _, _, u in samples(track, window)])
-    square, fourth = (moved**2).sum(axis=0), (moved**4).sum(axis=0)
+    """Count, squares, fourth powers and histogram by part of the path and spatial block."""
+    blocks, bins = block_count(track.place.shape[2]), len(edges) - 1
+    found = samples(track, window)
+    moved = np.array([u for _, _, u in found])
+    start = np.array([first for first, _, _ in found])
+    part = start * _PARTS // len(track.strain)
+    cluster = (part[:, None] * blocks + block[None]).ravel()
+    size = _PARTS * blocks
     rms = np.sqrt(np.mean(moved**2, axis=(0, 1)))
-    scaled = moved / np.where(rms > 0, rms, 1.0)
-    bins = len(edges) - 1
-    slot = np.floor((scaled - edges[0]) / (edges[1] - edges[0])).astype(np.int64)
-    key = np.broadcast_to(block[None, :, None], slot.shape) * bins + slot
+    flat = moved.reshape(-1, moved.shape[2])
+    slot = (flat / np.where(rms > 0, rms, 1.0) - edges[0]) / (edges[1] - edges[0])
+    slot = np.floor(slot).astype(np.int64)
+    key = cluster[:, None] * bins + slot
     inside = (slot >= 0) & (slot < bins)
     sums = {
-        "count": np.bincount(block, minlength=blocks) * len(moved),
-        "square": np.stack([np.bincount(block, s, blocks) for s in square.T], axis=1),
-        "fourth": np.stack([np.bincount(block, s, blocks) for s in fourth.T], axis=1),
-        "histogram": np.bincount(key[inside], minlength=blocks * bins).reshape(blocks, bins),
+        "count": np.bincount(cluster, minlength=size),
+        "square": np.stack([np.bincount(cluster, u**2, size) for u in flat.T], axis=1),
+        "fourth": np.stack([np.bincount(cluster, u**4, size) for u in flat.T], axis=1),
+        "histogram": np.bincount(key[inside], minlength=size * bins).reshape(size, bins),
     }
-    return {name: total.astype(np.float64) for name, total in sums.items()}
+    return {
+        name: total.astype(np.float64).reshape(_PARTS, blocks, *total.shape[1:])
+        for name, total in sums.items()
+    }
 
 
 def _statistics(sums: dict[str, Array], lengths: Array, width: float) -> dict[str, Array]:
-    """Everything that is reported, from sums over the windows (first axis) and blocks."""
+    """Everything that is reported, from sums by window, part of the path and block."""
     count, square, fourth, histogram = (
-        sums[name].sum(axis=1) for name in ("count", "square", "fourth", "histogram")
+        sums[name].sum(axis=(1, 2)) for name in ("count", "square", "fourth", "histogram")
     )
     dimension = square.shape[1]
+    count = np.where(count > 0, count, np.nan)
     component = square / count[:, None]
     with np.errstate(invalid="ignore", divide="ignore"):
         kurtosis = fourth / count[:, None] / component**2 - 3.0
@@ -166,21 +178,22 @@ def _exponent(lengths: Array, msd: Array) -> Array:
 
 
 def _jackknife(
-    sums: dict[str, Array], values: Callable[[dict[str, Array]], dict[str, Array]], blocks: int
-) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Values of all blocks, and errors from leaving out each block that holds grains."""
-    held = np.flatnonzero(sums["count"][0] > 0)
+    sums: dict[str, Array], values: Callable[[dict[str, Array]], dict[str, Array]], axis: int
+) -> dict[str, Array]:
+    """Standard errors from leaving out each cluster along ``axis`` that holds grains."""
+    others = tuple(k for k in range(sums["count"].ndim) if k != axis)
+    held = np.flatnonzero(sums["count"].sum(axis=others) > 0)
     replicas = [
-        values({name: np.delete(total, block, axis=1) for name, total in sums.items()})
-        for block in (held if len(held) > 1 else [])
+        values({name: np.delete(total, cluster, axis) for name, total in sums.items()})
+        for cluster in held
     ]
-    best = values(sums)
-    if not replicas:
-        return best, {name: np.full_like(value, np.nan) for name, value in best.items()}
-    scale = np.sqrt(len(replicas) - 1.0)
-    return best, {
-        name: scale * np.std([replica[name] for replica in replicas], axis=0) for name in best
-    }
+    scale = np.sqrt(max(len(held) - 1.0, 0.0))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a window that no replica can lack
+        return {
+            name: scale * np.nanstd([replica[name] for replica in replicas], axis=0)
+            for name in replicas[0]
+        }
 
 
 _TEXT = {
