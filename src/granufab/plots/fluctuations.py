@@ -20,6 +20,8 @@ __all__ = [
     "fluctuations",
 ]
 
+_WAVES = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10)
+
 MARKERS = ("o", "^", "s", "D", "v", "<", ">")
 
 
@@ -116,6 +118,7 @@ def fluctuation_kurtosis(data: xr.Dataset, *, ax: Axes | None = None) -> Axes:
         if not moved.all():
             ax.axvline(0.6 * strain[0], color=FIT, lw=0.6, ls=":")
         _tick_windows(ax, place, data["strain"].to_numpy())
+        ax.set_ylim(bottom=min(ax.get_ylim()[0], -0.2 * ax.get_ylim()[1]))
         ax.set_xlabel(r"$\Delta\varepsilon_q$ [-]")
         ax.set_ylabel("excess kurtosis [-]")
         ax.legend(loc="upper right")
@@ -188,6 +191,9 @@ def fluctuation_spectrum(
         ax.axhline(1.0, color=FIT, lw=0.7, ls=":")
         ax.set_xscale("log")
         ax.set_yscale("log")
+        low, high = ax.get_xlim()
+        named = [value for value in _WAVES if low < value < high]
+        ax.set_xticks(named, labels=[f"{value:g}" for value in named])
         ax.xaxis.set_minor_formatter(NullFormatter())
         ax.set_xlabel(r"$k d$ [-]")
         ax.set_ylabel(r"$S(k)$ [-]")
