@@ -296,12 +296,14 @@ def test_an_unreachable_start_becomes_the_nearest_one_and_is_said(tmp_path: Path
     assert result["paths"][0]["warnings"] == []
 
 
-def test_quick_changes_the_size_and_not_the_tolerance(
+def test_quick_changes_size_and_rate_and_not_the_tolerance(
     tmp_path: Path, results: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     quick = reproduce("fig7", quick=True, run_case=synthetic_run, workers=1)
     assert quick["settings"]["grain_count"] == 1000
+    cases = quick["settings"]["cases"].values()
+    assert {stage["inertial_number"] for case in cases for stage in case["path"]} == {1e-3}
     assert quick["solver"]["tolerance"] == results["fig7"]["solver"]["tolerance"]
     assert (tmp_path / "granufab-fig7" / "fig7.pdf").stat().st_size > 5000
 
