@@ -151,6 +151,7 @@ def test_one_wave_puts_its_power_where_it_must(rate, mode, along):
     dimension = len(rate)
     side = 20 if dimension == 2 else 8
     lattice = side * np.eye(dimension)
+    lattice[0, 1] = 0.45 * side  # a tilted cell: k is not along m
     wave = 2 * np.pi * np.linalg.inv(lattice).T @ np.array(mode)
     polar = wave / np.linalg.norm(wave)
     if not along:
@@ -162,13 +163,15 @@ def test_one_wave_puts_its_power_where_it_must(rate, mode, along):
         return 0.02 * np.cos(2 * np.pi * place @ np.array(mode))[:, None] * polar
 
     growth = [np.eye(dimension) + 1e-9 * rate]
-    states = frames(1e-6 * rate, count=side**dimension, number=2, interval=1e-3, steps=step)
+    states = frames(
+        1e-6 * rate, count=side**dimension, number=2, interval=1e-3, steps=step, first=0.45
+    )
     data = fluctuation_spectrum(states, bins=10, shortest=2.0)
     power = data["S"] * data["modes"]
     row = int(np.argmax(power.to_numpy()))
     # Sum over ±k of all modes is N; half of it lies on one side, most of it on this wave.
     assert float(power[row]) == pytest.approx(0.5 * side**dimension, rel=0.12)
-    edges = np.geomspace(0.9 * 2 * np.pi / side, np.pi, 11)
+    edges = np.geomspace(0.9 * 2 * np.pi / np.hypot(side, 0.45 * side), np.pi, 11)
     shell = np.searchsorted(edges, np.linalg.norm(wave)) - 1
     own = np.searchsorted(edges, data["k"].to_numpy()) - 1
     assert own[row] == shell
