@@ -2,12 +2,91 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import matplotlib.image
+import numpy as np
 import pytest
 
-FIGURES = ["path", "zaz", "series", "mohr", "rose", "network"]
+from granufab.cli import plot, plot_figures
+from granufab.fabric import neighbours_within
+from granufab.history import Frame
+from granufab.packing import Cell, Grains, Packing
+
+FIGURES = ["path", "zaz", "series", "mohr", "rose", "network", "branches", "forces", "texture"]
+FIGURES += ["sff", "criterion"]
+
+
+def test_every_figure_of_the_command_line_can_be_drawn() -> None:
+    assert list(get_args(plot.Name)) == list(plot_figures.FIGURES)
+
+
+def moving_run(path: Path, dimension: int = 2) -> Path:
+    """Grains on a jittered lattice in an affine flow, every pair in reach a contact."""
+    from granufab.io import RunFileWriter
+    from granufab.simulate.settings import Case, Sample
+
+    random = np.random.default_rng(1)
+    side = 10 if dimension == 2 else 6
+    steps = np.stack(np.meshgrid(*[np.arange(side)] * dimension, indexing="ij"), axis=-1)
+    rest = steps.reshape(-1, dimension) + 0.05 * random.standard_normal(
+        (side**dimension, dimension)
+    )
+    settings = Case(sample=Sample(dimension=dimension)).model_dump(mode="json")
+    with RunFileWriter(path, settings=settings) as writer:
+        for index in range(12):
+            strain = 0.01 * index
+            gradient = np.eye(dimension)
+            gradient[0, 0], gradient[1, 1] = 1 + strain / 2, 1 - strain / 2
+            wander = 0.01 * random.standard_normal(rest.shape)
+            bare = Packing(
+                grains=Grains(
+                    position=(rest + wander) @ gradient.T, radius=np.full(len(rest), 0.52)
+                ),
+                cell=Cell(matrix=side * gradient),
+            )
+            near = neighbours_within(bare, 0.02)
+            strength = random.exponential(size=(near.count, 1))
+            writer.frame(
+                Frame(
+                    packing=replace(bare, contacts=replace(near, force=strength * near.normal)),
+                    eps_q=strain,
+                    eps_q_total=strain,
+                    strain=np.zeros((dimension, dimension)),
+                    stage=0,
+                    stress=np.eye(dimension),
+                    inertial_number=1e-3,
+                    direction=np.eye(dimension)[1],
+                )
+            )
+    return path
+
+
+@pytest.mark.parametrize("figure", ["velocity", "fluctuations", "balance", "homogeneity"])
+def test_figures_of_motion(granufab, tmp_path: Path, figure: str) -> None:
+    out = tmp_path / f"{figure}.png"
+    done = granufab("plot", moving_run(tmp_path / "run.h5"), "--figure", figure, "-o", out)
+    assert done.code == 0, done.err
+    picture = matplotlib.image.imread(out)
+    assert picture[..., :3].min() < 0.5 < picture[..., :3].max()
+
+
+def test_the_network_of_spheres(granufab, tmp_path: Path) -> None:
+    run, out = moving_run(tmp_path / "run.h5", dimension=3), tmp_path / "network.png"
+    assert granufab("plot", run, "--figure", "network", "-o", out).code == 0
+    colours = matplotlib.image.imread(out)[..., :3].reshape(-1, 3)
+    assert len(np.unique(np.round(colours, 2), axis=0)) > 50  # the farther, the paler
+
+
+def test_a_figure_of_one_state_takes_one_run(granufab, run_file: Path, tmp_path: Path) -> None:
+    out = tmp_path / "forces.png"
+    other = tmp_path / "other.h5"
+    other.write_bytes(run_file.read_bytes())
+    done = granufab("plot", run_file, other, "--figure", "forces", "-o", out)
+    assert done.code == 2
+    assert "forces draws one run, got 2" in done.err
 
 
 @pytest.mark.parametrize("figure", FIGURES)
