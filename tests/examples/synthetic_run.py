@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from granufab.errors import NotConverged
 from granufab.history import Frame, Run, StepStatistics, series_dataset
 from granufab.packing import Cell, Contacts, Grains, Packing
+from granufab.reproduce import reproduce
 from granufab.simulate.settings import Case, Sample
 
 Z_STAR, A_STAR = 3.35, 0.24
@@ -39,9 +41,24 @@ def synthetic_run(
     )
 
 
+def reproduce_synthetic(figure: str, out: Path, **options: Any) -> dict[str, Any]:
+    """A figure from synthetic runs, in this process."""
+    options = {"run_case": synthetic_run, "prepare": synthetic_sample, "workers": 1} | options
+    return reproduce(figure, out=out, **options)
+
+
 def synthetic_sample(sample: Sample, *, progress: Any = None) -> str:
     """Stands for a sample; the synthetic run does not look at it."""
     return f"sample of {sample.grain_count} grains"
+
+
+def run_of_a_sample(
+    case: Case, *, record: Any = None, progress: Any = None, start: Any = None
+) -> Run:
+    """Runs only from a sample that was made before."""
+    if start != f"sample of {case.sample.grain_count} grains":
+        raise NotConverged(f"started from {start!r}")
+    return synthetic_run(case, record=record, progress=progress)
 
 
 def reluctant_run(case: Case, *, record: Any = None, progress: Any = None) -> Run:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -20,17 +19,19 @@ from synthetic_run import (
     Z_STAR,
     failing_run,
     reluctant_run,
+    reproduce_synthetic,
+    run_of_a_sample,
     synthetic_run,
     synthetic_sample,
 )
 
-from granufab.errors import GranufabError, InvalidSettings, NotConverged
+from granufab.errors import NotConverged
 from granufab.history import SERIES_UNITS
-from granufab.io import read
-from granufab.reproduce import FIGURES, reproduce, run_into_folder
+from granufab.reproduce import FIGURES, reproduce
 from granufab.reproduce.case_folder import RUN_FILES
 from granufab.reproduce.out_folder import prepare_out_folder
-from granufab.simulate.settings import Case, Sample, load_case
+from granufab.reproduce.workers import Job, run_jobs
+from granufab.simulate.settings import Case, Sample
 
 FITTED = ("fig5", "fig6", "fig7", "fig8")
 HERE = Path(__file__).parent
@@ -42,36 +43,6 @@ SOLVER_KEYS = {
     "tolerance", "residual_max", "sweeps_mean", "nonconverged_steps", "steps", "overlap_max",
     "contact_updates", "seconds", "inertial_number", "stiffness",
 }  # fmt: skip
-
-
-def _reproduce(figure: str, out: Path, **options: Any) -> dict[str, Any]:
-    options = {"run_case": synthetic_run, "prepare": synthetic_sample, "workers": 1} | options
-    return reproduce(figure, out=out, **options)
-
-
-@pytest.fixture(scope="module")
-def everything(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any], list[Case]]:
-    """The folder of ``reproduce all``, what it returned, and the cases that were run."""
-    folder = tmp_path_factory.mktemp("figures") / "all"
-    cases: list[Case] = []
-
-    def run(case: Case, **options: Any) -> Any:
-        cases.append(case)
-        return synthetic_run(case, **options)
-
-    return folder, _reproduce("all", folder, run_case=run), cases
-
-
-@pytest.fixture(scope="module")
-def results(everything: Any) -> dict[str, Any]:
-    return everything[1]
-
-
-@pytest.fixture(scope="module")
-def single(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
-    """The folder of ``reproduce fig7`` alone, and what it returned."""
-    folder = tmp_path_factory.mktemp("single") / "fig7"
-    return folder, _reproduce("fig7", folder)
 
 
 ENDINGS = (".pdf", ".png", ".json", ".csv")
@@ -139,11 +110,11 @@ def test_a_figure_that_cannot_be_made_leaves_the_others(
     def without_fig6(recipe: Any, *arguments: Any) -> dict[str, Any]:
         if recipe.figure == "fig6":
             raise NotConverged("no plateau")
-        return {} if recipe.figure in FITTED else leave(recipe, *arguments)
+        return leave(recipe, *arguments) if recipe.figure == "fig1" else {}
 
     monkeypatch.setattr(engine, "_leave", without_fig6)
     with pytest.raises(NotConverged, match="fig6: no plateau"):
-        _reproduce("all", tmp_path / "out", grains=50)
+        reproduce_synthetic("all", tmp_path / "out", grains=50)
     assert (tmp_path / "out" / "fig1.json").exists()
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["fig6"] == {"error": "no plateau"}
@@ -282,13 +253,31 @@ def test_fig8_shears_one_sample(tmp_path: Path) -> None:
         return synthetic_run(case, record=record, progress=progress)
 
     with pytest.raises(NotConverged, match=r"path mu0\.9: enough seen"):
-        _reproduce("fig8", tmp_path / "out", grains=50, run_case=run, prepare=prepare)
+        reproduce_synthetic("fig8", tmp_path / "out", grains=50, run_case=run, prepare=prepare)
     assert len(made) == 1
     assert starts == made * 5
 
 
+def test_workers_wait_for_the_sample_that_they_share(tmp_path: Path) -> None:
+    lines: list[str] = []
+    sample = Sample(grain_count=50, coordination=3.7)
+    alike = [
+        Job(case=Case(name=f"mu{k}", sample=sample), folder=tmp_path / f"mu{k}", shared=True)
+        for k in range(3)
+    ]
+    run_jobs(
+        alike, workers=2, run_case=run_of_a_sample, prepare=synthetic_sample,
+        progress=lambda text, share: lines.append(text),
+    )  # fmt: skip
+    assert all((job.folder / "summary.json").exists() for job in alike)
+    assert lines[-1] == "done"
+    lone = Job(case=Case(name="lone", sample=sample), folder=tmp_path / "lone")
+    with pytest.raises(NotConverged, match="path lone: started from None"):
+        run_jobs([lone], workers=1, run_case=run_of_a_sample, prepare=synthetic_sample)
+
+
 def test_an_unreachable_start_becomes_the_nearest_one_and_is_said(tmp_path: Path) -> None:
-    result = _reproduce("fig7", tmp_path / "out", grains=50, run_case=reluctant_run)
+    result = reproduce_synthetic("fig7", tmp_path / "out", grains=50, run_case=reluctant_run)
     loose = result["paths"][1]
     assert loose["z_0_wanted"] == 3.1
     assert loose["z_0"] == 3.5
@@ -374,100 +363,3 @@ def _ends(group: int, patience: float = 5.0) -> bool:
             return True
         time.sleep(0.05)
     return False
-
-
-@pytest.fixture
-def earlier(tmp_path: Path, single: Any) -> Path:
-    """A folder as ``reproduce fig7`` leaves it."""
-    return Path(shutil.copytree(single[0], tmp_path / "earlier"))
-
-
-def test_an_earlier_result_is_replaced(earlier: Path) -> None:
-    assert prepare_out_folder("fig7", ["fig7"], earlier) == earlier
-    assert list(earlier.iterdir()) == []
-
-
-def test_foreign_files_need_force_and_stay(earlier: Path) -> None:
-    (earlier / "notes.txt").write_text("mine")
-    before = sorted(earlier.rglob("*"))
-    with pytest.raises(InvalidSettings, match=r"notes\.txt.*force"):
-        prepare_out_folder("fig7", ["fig7"], earlier)
-    assert sorted(earlier.rglob("*")) == before
-    prepare_out_folder("fig7", ["fig7"], earlier, force=True)
-    assert [entry.name for entry in earlier.iterdir()] == ["notes.txt"]
-
-
-def test_the_default_folder_is_replaced_but_never_what_is_not_ours(
-    earlier: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    default = earlier.rename(tmp_path / "granufab-fig7")
-    (default / "notes.txt").write_text("mine")
-    (default / "runs" / "dense" / "drawing.svg").write_text("mine")
-    prepare_out_folder("fig7", ["fig7"], None)
-    assert sorted(entry.name for entry in default.iterdir()) == ["notes.txt", "runs"]
-    assert (default / "runs" / "dense" / "drawing.svg").read_text() == "mine"
-
-
-def test_the_result_of_another_figure_is_foreign(earlier: Path) -> None:
-    with pytest.raises(InvalidSettings, match=r"holds fig7"):
-        prepare_out_folder("fig5", ["fig5"], earlier)
-
-
-def test_a_runs_folder_of_someone_else_is_not_touched(tmp_path: Path) -> None:
-    theirs = tmp_path / "out" / "runs" / "a" / "data.bin"
-    theirs.parent.mkdir(parents=True)
-    theirs.write_text("mine")
-    with pytest.raises(InvalidSettings, match="holds runs"):
-        _reproduce("fig7", tmp_path / "out")
-    assert theirs.read_text() == "mine"
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"figure": "fig9"}, "fig9.*known: fig1, fig2, .*fig8, all"),
-        ({"figure": "fig7", "grains": 0}, "grains must be at least 1, got 0"),
-        ({"figure": "fig7", "seeds": 0}, "seeds must be at least 1, got 0"),
-        ({"figure": "fig7", "seed": -1}, "seed must be at least 0, got -1"),
-    ],
-)
-def test_bad_input_is_one_clear_line(tmp_path: Path, options: Any, words: str) -> None:
-    with pytest.raises(InvalidSettings, match=words) as caught:
-        reproduce(out=tmp_path / "out", run_case=synthetic_run, **options)
-    assert "\n" not in str(caught.value)
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_folder_that_cannot_be_written_is_said_before_computing(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    for out in (tmp_path / "file", tmp_path / "file" / "below"):
-        with pytest.raises(InvalidSettings, match="file"):
-            _reproduce("fig7", out)
-        with pytest.raises(InvalidSettings, match="cannot be written"):
-            run_into_folder(Case(), out, run_case=_never)
-
-
-def _never(*_: Any, **__: Any) -> Any:
-    raise AssertionError("nothing may be computed")
-
-
-def test_a_run_folder_can_be_read_back_and_is_not_overwritten(tmp_path: Path) -> None:
-    case = Case(name="one", sample=Sample(grain_count=100, coordination=3.5, seed=7))
-    run = run_into_folder(case, tmp_path / "one", run_case=synthetic_run)
-    assert {entry.name for entry in (tmp_path / "one").iterdir()} == set(RUN_FILES)
-    assert load_case(tmp_path / "one" / "settings.toml") == case
-    stored = read(tmp_path / "one" / "run.h5")
-    np.testing.assert_array_equal(stored.series["z_backbone"], run.series["z_backbone"])
-    assert json.loads((tmp_path / "one" / "summary.json").read_text())["z_0"] == 3.5
-    before = (tmp_path / "one" / "run.h5").read_bytes()
-    with pytest.raises(InvalidSettings, match=r"run\.h5.*force"):
-        run_into_folder(case, tmp_path / "one", run_case=_never)
-    assert (tmp_path / "one" / "run.h5").read_bytes() == before
-    run_into_folder(case, tmp_path / "one", run_case=synthetic_run, force=True)
-
-
-def test_an_unforeseen_error_in_a_worker_is_one_line_too(tmp_path: Path) -> None:
-    with pytest.raises(GranufabError, match="path dense: AssertionError: nothing may be") as caught:
-        reproduce("fig7", out=tmp_path / "out", run_case=_never, workers=1)
-    assert "\n" not in str(caught.value)

@@ -103,12 +103,12 @@ def _run_serial(tasks: _Tasks, run_case: RunCase | None, prepare: Prepare | None
     made: dict[Sample, Any] = {}
     for index, sample in enumerate(tasks.samples):
         made[sample] = _make_sample(sample, partial(tasks.board.post, index), prepare)
-        tasks.board.post(index, "done", 1.0)
+        tasks.board.done(index)
     for job in tasks.jobs:
         index = tasks.place(job)
         start = made[job.case.sample] if job.shared else None
         _run_one(job, start, partial(tasks.board.post, index), run_case)
-        tasks.board.post(index, "done", 1.0)
+        tasks.board.done(index)
 
 
 class _Board:
@@ -118,9 +118,17 @@ class _Board:
         self.names = list(names)
         self.text = ["waiting"] * len(self.names)
         self.share = [0.0] * len(self.names)
+        self.finished = [False] * len(self.names)
         self.progress = progress
 
+    def done(self, index: int) -> None:
+        """Count it as finished; news of it that arrives late is dropped."""
+        self.post(index, "done", 1.0)
+        self.finished[index] = True
+
     def post(self, index: int, text: str, share: float) -> None:
+        if self.finished[index]:
+            return
         self.text[index] = text
         self.share[index] = min(max(share, 0.0), 1.0)
         if self.progress is None:
@@ -241,7 +249,7 @@ def _follow(
                     "give workers=1)"
                 ) from None
             place = futures[future]
-            tasks.board.post(place, "done", 1.0)
+            tasks.board.done(place)
             if place < len(tasks.samples):
                 submit(tasks.samples[place], made)
         pending |= set(futures) - known
