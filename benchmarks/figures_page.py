@@ -130,6 +130,9 @@ def fig4(result: Result) -> str:
     known = (count >= 20) & np.isfinite(share) & np.isfinite(spread)
     disturbed = known & (np.abs(share - 1) > np.maximum(2 * spread, 0.1))
     reach = float(distance[disturbed].max()) if disturbed.any() else 0.0
+    shells = known & (distance > 1.3)
+    flux = share[shells] * count[shells] / distance[shells]
+    uneven = float(flux.std() / flux.mean())
     near = known & (np.abs(distance - 1.0) < 0.11)
     contact = float(np.average(share[near], weights=count[near]))
     gradient = np.array2string(far, precision=3, suppress_small=True).replace("\n", "")
@@ -152,6 +155,12 @@ def fig4(result: Result) -> str:
                 "of the order of ⟨ℓ⟩ from the grain",
                 f"{reach:.2f} ⟨ℓ⟩",
                 "agrees" if reach < 2.6 else "farther than the paper says",
+            ),
+            (
+                "scatter of that ratio times the density of pairs, beyond 1.3 ⟨ℓ⟩",
+                "–",
+                f"{100 * uneven:.0f} %",
+                "the flux of pairs hardly depends on distance" if uneven < 0.15 else "it varies",
             ),
         ]
     )

@@ -24,6 +24,8 @@ def _draw(outcome: Outcome) -> Figure:
         critical=(fit.z_star.value, fit.a_star.value),
         ax=panels,
     )
+    low, high = panels[0].get_ylim()
+    panels[0].set_ylim(low - 0.12 * (high - low), high)  # the panel's letter covers no curve
     return figure
 
 
