@@ -35,8 +35,9 @@ def network_3d(
 ) -> Axes:
     """Contacts between spheres in a part of the packing [Radjai2012, Fig. 1].
 
-    The part is a ball about the middle of the cell, so that it looks alike from every side; what
-    lies farther from the eye is paler. A line joins the centres of two touching grains, its width
+    The part is a ball about the middle of the cell, so that it looks alike from every side; where
+    it is larger than a periodic cell, images are drawn too. What lies farther from the eye is
+    paler. A line joins the centres of two touching grains, its width
     proportional to the normal force (equal for all where the source has no forces). Grains are
     drawn smaller than they are, or the network would hide behind them; only those with a contact
     are shown.
