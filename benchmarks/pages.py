@@ -123,6 +123,14 @@ def triaxial(folder: Path) -> None:
                 row.append(interval(found[0][name]) if found else "–")
             lines.append("| " + " | ".join(row) + " |")
     insert("triaxial.md", "prediction", "\n".join(lines))
+    lines = ["| criterion | z* | \\|a*\\| | z_min | z_max | extension predicted | measured |"]
+    lines.append("|" + "---|" * 7)
+    for row in data["criteria"]:
+        cells = [row["criterion"], *(f"{row[k]:.3f}" for k in ("z_star", "a_star"))]
+        cells += [f"{row[k]:.2f}" for k in ("z_min", "z_max")]
+        cells += ["{:.3f}, {:.3f}".format(*row[k]) for k in ("predicted", "measured")]
+        lines.append("| " + " | ".join(cells) + " |")
+    insert("triaxial.md", "criteria", "\n".join(lines))
 
 
 def convergence(folder: Path) -> None:

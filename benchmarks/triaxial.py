@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 SAMPLES = {"dense": 0.03, "loose": 1.0}  # compaction friction
+CRITERIA = ("force", "gap:0.001", "gap:0.005", "gap:0.015")
 PATHS = {
     ("dense", "compression"): {},
     ("loose", "compression"): {},
@@ -84,6 +85,36 @@ def domain_of(folder: str, mode: str) -> dict[str, Any]:
             "solver": solver}  # fmt: skip
 
 
+def by_criterion(folders: dict[tuple[str, str], str]) -> list[dict[str, Any]]:
+    """z and |a'| over the recorded states of the plateau, and the prediction, per criterion."""
+    from granufab import AccessibleDomain, read
+    from granufab.fabric import late_frames, measure
+
+    table = []
+    for criterion in CRITERIA:
+        states: dict[str, list[tuple[float, float]]] = {"compression": [], "extension": []}
+        for (_, mode), folder in folders.items():
+            if mode not in states:
+                continue
+            for frame in late_frames(read(Path(folder) / "run.h5")):
+                found = measure(
+                    frame.packing, criterion=criterion, direction=frame.direction, reach=0.05
+                )
+                states[mode].append((float(found["z_backbone"]), abs(float(found["a_signed"]))))  # type: ignore[arg-type]
+        z, a = np.mean(states["compression"], axis=0)
+        limits = AccessibleDomain.from_critical(z, a, dimension=3)
+        turned = AccessibleDomain(
+            z_min=limits.z_min, z_max=limits.z_max, dimension=3, mode="extension"
+        )
+        measured = np.mean(states["extension"], axis=0)
+        table.append({
+            "criterion": criterion, "z_star": z, "a_star": a,
+            "z_min": limits.z_min, "z_max": limits.z_max,
+            "predicted": [turned.z_star, turned.a_star], "measured": measured.tolist(),
+        })  # fmt: skip
+    return table
+
+
 def predict(compression: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
     """Extension and b = 1/2 states from the limits of compression, with 95 % intervals."""
     from granufab import AccessibleDomain
@@ -134,7 +165,12 @@ def main() -> None:
     compression = [rows[start, "compression"] for start in SAMPLES]
     table = [{"start": start, "mode": mode, **row} for (start, mode), row in rows.items()]
     settings = {k: v for k, v in vars(given).items() if k not in ("out", "workers")}
-    data = {"settings": settings, "paths": table, "predicted": predict(compression)}
+    data = {
+        "settings": settings,
+        "paths": table,
+        "predicted": predict(compression),
+        "criteria": by_criterion(dict(zip(keys, folders, strict=True))),
+    }
     (given.out / "triaxial.json").write_text(json.dumps(data, indent=1))
     print(json.dumps(data, indent=1))
 
