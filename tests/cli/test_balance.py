@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from moving_run import moving_run
 
 from granufab.history import Frame
 from granufab.packing import Cell, Contacts, Grains, Packing
@@ -116,6 +117,30 @@ def test_the_table_for_people(granufab, turning_run: Path) -> None:
     assert "kept to a gap of 0.02" in done.out
     for frames in ("0–1", "1–2", "2–3"):
         assert frames in done.out
+
+
+def test_mean_rates_over_a_window(granufab, turning_run: Path) -> None:
+    items = json.loads(granufab("balance", turning_run, "--json").out)[1:]
+    done = granufab("balance", turning_run, "--window", 0.01, 0.03)
+    assert done.code == 0
+    words = done.out.splitlines()[-1].split()
+    assert words[:4] == ["mean", "over", "∫|dε_q|", "="]
+    for name, sign in (("gained", "I+"), ("lost", "I-")):
+        rate = sum(item[name] for item in items) / 0.02 / 12  # per unit strain and grain
+        assert float(words[words.index(sign) + 1]) == pytest.approx(rate, rel=1e-3)
+    late = granufab("balance", turning_run, "--window", 1, 2)
+    assert "no interval lies within the strain window" in late.out
+
+
+def test_the_contacts_of_another_definition(granufab, tmp_path: Path) -> None:
+    run = moving_run(tmp_path / "run.h5")  # every pair in reach is a contact: some lone pairs
+    every, held = (
+        json.loads(granufab("balance", run, "--json", *options).out)
+        for options in ((), ("--z-definition", "z_backbone"))
+    )
+    assert {item["z_definition"] for item in every} == {"z"}
+    assert {item["z_definition"] for item in held} == {"z_backbone"}
+    assert sum(held[0]["before"]) < sum(every[0]["before"])
 
 
 def test_tables_and_figure(granufab, turning_run: Path, tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def test_the_table_and_the_figure(granufab, run_file: Path, tmp_path: Path) -> N
         (["--frame", 9], "holds frames 0..2"),
         (["--window", -1], "must be a strain >= 0"),
         (["--bootstrap", -1], "must be >= 0"),
-        (["-o", "curves.txt"], "must end in .pdf"),
+        (["-o", "curves.txt"], "must end in one of .pdf"),
         (["-o", "nowhere/curves.pdf"], "there is no folder nowhere"),
     ],
 )

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from granufab.cli.measure import check_table
-from granufab.cli.plot import check_figure
+from granufab.cli.choices import Definition
+from granufab.cli.output_files import check_figure, check_table
+from granufab.errors import MissingData
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,6 +55,13 @@ def balance(
         float | None,
         typer.Option(metavar="GAP", help="Keep a contact up to this gap [mean diameters]."),
     ] = None,
+    z_definition: Annotated[
+        Definition, typer.Option(help="Whose contacts count; z is 2 N_c/N in any case.")
+    ] = "z",
+    window: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="FROM TO", help="∫|dε_q| of means and figure; default late strain."),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="A JSON list on standard output.")] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE.csv|.nc", help="Also write all values here.")
@@ -64,27 +72,37 @@ def balance(
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
 ) -> None:
-    """Count contacts gained, lost and turned between states, by direction (eq. 16)."""
+    """Count contacts gained, lost and turned between states, by direction (eq. 16).
+
+    JSON and FILE hold every interval; the figure and the mean rates are over the window.
+    """
     from granufab.cli.output import print_json, print_rows
     from granufab.fabric import balance_run
     from granufab.io import read
 
     check_table(out, force)
-    if figure is not None:
-        check_figure(figure, force)
-    table = balance_run(read(run), every=interval, criterion=criterion, bins=bins, keep=keep)
+    check_figure(figure, force)
+    table = balance_run(
+        read(run),
+        every=interval,
+        criterion=criterion,
+        z_definition=z_definition,
+        bins=bins,
+        keep=keep,
+    )
     if out is not None:
         _write(table, out)
     if figure is not None:
         from granufab import plots
 
-        cast("Figure", plots.balance(table)[0].figure).savefig(figure, dpi=300)
+        cast("Figure", plots.balance(table, window=window)[0].figure).savefig(figure, dpi=300)
     if json:
         print_json(list(_intervals(run, table)))
         return
     kept = "" if keep is None else f", kept to a gap of {keep:g} d"
     title = f"{run}; contacts: {criterion}{kept}; rates per grain and unit strain"
     print_rows(title, HEADER, _rows(table))
+    print(_mean_rates(table, window))
 
 
 def _intervals(run: Path, table: xr.Dataset) -> Iterator[dict[str, Any]]:
@@ -94,6 +112,7 @@ def _intervals(run: Path, table: xr.Dataset) -> Iterator[dict[str, Any]]:
         "source": str(run),
         "criterion": table.attrs["criterion"],
         "keep": table.attrs["keep"],
+        "z_definition": table.attrs["z_definition"],
         "direction": table.attrs["direction"].tolist(),
         "bin_edges": table["theta_edge"].values.tolist(),
         "grain_count": int(table.attrs["grain_count"]),
@@ -115,6 +134,21 @@ def _rows(table: xr.Dataset) -> Iterator[list[Any]]:
             item["az_after"] - item["az_before"],
             item["az_rotation"],
         ]
+
+
+def _mean_rates(table: xr.Dataset, window: tuple[float, float] | None) -> str:
+    from granufab.fabric import average_balance
+
+    try:
+        mean = average_balance(table, window=window)
+    except MissingData as error:
+        return f"no mean rates: {error}"
+    low, high = mean.attrs["window"]
+    rates = ", ".join(
+        f"{text} {float(mean[name]):.4g} ± {float(mean[f'{name}_error']):.2g}"
+        for text, name in (("I+", "gain_rate_total"), ("I-", "loss_rate_total"))
+    )
+    return f"mean over ∫|dε_q| = {low:.3g}..{high:.3g}: {rates}"
 
 
 def _write(table: xr.Dataset, out: Path) -> None:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
+from granufab.cli.choices import Definition
+from granufab.cli.output_files import check_figure
 from granufab.errors import InvalidSettings
 
 if TYPE_CHECKING:
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["criterion"]
 
-Definition = Literal["z", "z_backbone", "z_mechanical"]
 QUANTITIES = ("z", "a", "az", "rattler_fraction")
 HEADER = ("threshold", "z", "±", "a", "±", "az", "±", "rattlers", "±")
 KINDS = {"force": "normal force above [mean normal forces]", "gap": "gap below [mean diameters]"}
@@ -50,8 +51,7 @@ def criterion(
     from granufab.fabric import criterion_curves
     from granufab.io import read
 
-    if output is not None:
-        _check_output(output, force)
+    check_figure(output, force)
     if bootstrap < 0:
         raise InvalidSettings(f"--bootstrap {bootstrap}: must be >= 0")
     loaded = read(run)
@@ -72,15 +72,6 @@ def criterion(
         from granufab.plots import criterion_curves as draw
 
         cast("Figure", draw(curves)[0].figure).savefig(output, dpi=300)
-
-
-def _check_output(output: Path, force: bool) -> None:
-    if output.suffix.lower() not in (".pdf", ".png", ".svg"):
-        raise InvalidSettings(f"-o {output}: the name must end in .pdf, .png or .svg")
-    if output.exists() and not force:
-        raise InvalidSettings(f"{output}: exists already; choose another name, or --force")
-    if not output.parent.is_dir():
-        raise InvalidSettings(f"{output}: there is no folder {output.parent}")
 
 
 def _entry(source: Path, run: Run, frame: int, window: float, curves: xr.Dataset) -> dict[str, Any]:

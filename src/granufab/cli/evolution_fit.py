@@ -4,24 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from granufab.errors import InvalidSettings
+from granufab.cli.choices import Form
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from granufab.states import AccessibleFit, EvolutionFit
 
-__all__ = ["check_new", "fit_law", "print_law", "write_law"]
-
-Form = Literal["minimal", "early", "shedding", "memory"]
-
-
-def check_new(file: Path | None, force: bool) -> None:
-    """Refuse to write over a file before anything is computed."""
-    if file is not None and file.exists() and not force:
-        raise InvalidSettings(f"{file}: exists already; name another file, or --force")
+__all__ = ["fit_law", "print_law", "write_law"]
 
 
 def fit_law(

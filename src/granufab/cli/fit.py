@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from granufab.cli.evolution_fit import check_new, fit_law, print_law, write_law
+from granufab.cli.choices import Definition, Form
+from granufab.cli.evolution_fit import fit_law, print_law, write_law
+from granufab.cli.output_files import check_new
 from granufab.errors import GranufabError, MissingData
 
 if TYPE_CHECKING:
@@ -21,8 +23,6 @@ __all__ = ["fit", "fit_series", "known_rows", "read_paths"]
 
 Method = Literal["critical", "envelope", "lines"]
 Mode = Literal["compression", "extension"]
-Definition = Literal["z", "z_backbone", "z_mechanical"]
-Form = Literal["minimal", "early", "shedding", "memory"]
 
 
 def fit(

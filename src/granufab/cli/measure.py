@@ -5,10 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from granufab.cli.choices import Definition
+from granufab.cli.output_files import check_table
 from granufab.errors import InvalidSettings
 
 if TYPE_CHECKING:
@@ -16,9 +18,8 @@ if TYPE_CHECKING:
 
     from granufab.history import Run
 
-__all__ = ["check_table", "measure"]
+__all__ = ["measure"]
 
-Definition = Literal["z", "z_backbone", "z_mechanical"]
 COUNTS = ("contact_count", "grain_count", "dimension", "stage")
 SHOWN = (
     "frame",
@@ -84,16 +85,6 @@ def _measure_file(file: Path, criterion: str, z_definition: Any, frame: int | No
     _explain_unknown(file, run, table)
     table = table.assign(source=("frame", [str(file)] * len(numbers)))
     return table.assign_coords(frame=numbers)
-
-
-def check_table(out: Path | None, force: bool) -> None:
-    """Refuse a table that cannot be written: another ending, or a file that exists."""
-    if out is None:
-        return
-    if out.suffix not in (".csv", ".nc"):
-        raise InvalidSettings(f"--out {out}: the name must end in .csv or .nc")
-    if out.exists() and not force:
-        raise InvalidSettings(f"{out}: exists already; name another file, or --force")
 
 
 def _states(table: xr.Dataset) -> Iterator[dict[str, Any]]:

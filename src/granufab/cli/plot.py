@@ -7,20 +7,19 @@ from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
+from granufab.cli.choices import Definition
+from granufab.cli.output_files import check_figure
 from granufab.cli.plot_figures import FIGURES, Request
-from granufab.errors import InvalidSettings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["check_figure", "plot"]
+__all__ = ["plot"]
 
 Name = Literal[
     "path", "zaz", "series", "mohr", "rose", "network", "homogeneity", "velocity", "fluctuations",
     "balance", "branches", "forces", "texture", "sff", "criterion",
 ]  # fmt: skip
-Definition = Literal["z", "z_backbone", "z_mechanical"]
-ENDINGS = (".pdf", ".png", ".svg", ".eps", ".jpg", ".jpeg", ".tif", ".tiff", ".webp")
 
 
 def plot(
@@ -55,15 +54,3 @@ def plot(
     )
     panel = FIGURES[figure](request)
     cast("Figure", panel.figure).savefig(output, dpi=300)
-
-
-def check_figure(output: Path, force: bool) -> None:
-    """Refuse a figure that cannot be written: ending, existing file, missing folder."""
-    if output.suffix.lower() not in ENDINGS:
-        raise InvalidSettings(f"-o {output}: the name must end in one of {', '.join(ENDINGS)}")
-    if output.exists() and not force:
-        raise InvalidSettings(
-            f"{output}: exists already; choose another name, or --force to replace it"
-        )
-    if not output.parent.is_dir():
-        raise InvalidSettings(f"{output}: there is no folder {output.parent}")

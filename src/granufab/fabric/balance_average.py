@@ -37,8 +37,8 @@ def average_balance(data: xr.Dataset, *, window: tuple[float, float] | None = No
     Args:
         data: result of :func:`~granufab.fabric.balance_run`.
         window: ∫|dε_q| from and to; intervals that lie inside count, so let it not span a
-            reversal. Default: the last third of
-            the first stage that walks at least half as far as the longest one.
+            reversal. Default: the last third of the first stage that walks at least half as far
+            as the longest one.
     Returns:
         Over ``bin`` [1/rad in 2D, 1/sr in 3D]: E, gain_rate, loss_rate, net_rate, divergence
         (of J), storage_rate (∂E/∂ε_q), and divergence_affine; over ``edge`` [-]: current_rate,
