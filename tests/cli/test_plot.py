@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
@@ -10,7 +11,9 @@ import numpy as np
 import pytest
 from moving_run import moving_run
 
+from granufab import fabric
 from granufab.cli import plot, plot_figures
+from granufab.io import read
 
 FIGURES = ["path", "zaz", "series", "mohr", "rose", "network", "branches", "forces", "texture"]
 FIGURES += ["sff", "criterion"]
@@ -34,6 +37,33 @@ def test_the_network_of_spheres(granufab, tmp_path: Path) -> None:
     assert granufab("plot", run, "--figure", "network", "-o", out).code == 0
     colours = matplotlib.image.imread(out)[..., :3].reshape(-1, 3)
     assert len(np.unique(np.round(colours, 2), axis=0)) > 50  # the farther, the paler
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_mohr_circle_spans_the_measured_values(tmp_path: Path, dimension: int) -> None:
+    """In 3D whatever the middle one is: a fabric in extension is none in compression."""
+    run = read(moving_run(tmp_path / "run.h5", dimension))
+    request = plot_figures.Request(
+        figure="mohr", runs={"run": run}, index=-1, criterion="force", z_definition="z_backbone"
+    )
+    drawn = next(
+        line
+        for line in plot_figures.FIGURES["mohr"](request).get_lines()
+        if line.get_label() == run.name
+    )
+    values = fabric.measure(run.frames[-1].packing)
+    assert np.max(drawn.get_xdata()) == pytest.approx(values["g_1"], rel=1e-4)
+    assert np.min(drawn.get_xdata()) == pytest.approx(values[f"g_{dimension}"], rel=1e-4)
+
+
+def test_runs_are_labelled_by_name_where_names_differ(run_file: Path) -> None:
+    run = read(run_file)
+    options = {"figure": "rose", "index": -1, "criterion": "force", "z_definition": "z"}
+    other = replace(run, name="another")
+    different = plot_figures.Request(runs={"a.h5": run, "b.h5": other}, **options)
+    assert list(different.labels.values()) == ["made-up", "another"]
+    alike = plot_figures.Request(runs={"a.h5": run, "b.h5": run}, **options)
+    assert list(alike.labels.values()) == ["a.h5", "b.h5"]
 
 
 def test_a_figure_of_one_state_takes_one_run(granufab, run_file: Path, tmp_path: Path) -> None:

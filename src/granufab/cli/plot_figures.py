@@ -42,6 +42,13 @@ class Request:
         """The one run."""
         return next(iter(self.runs.values()))
 
+    @property
+    def labels(self) -> dict[str, str]:
+        """Text of the legend by file: the runs' names, or the files where these are alike."""
+        names = {file: run.name for file, run in self.runs.items()}
+        distinct = all(names.values()) and len(set(names.values())) == len(names)
+        return names if distinct else {file: file for file in names}
+
     def frame(self, name: str) -> Frame:
         """The wanted state of a run.
 
@@ -145,10 +152,10 @@ def _mohr(request: Request) -> Axes:
     from granufab import fabric, plots, states
 
     circles = {}
-    for name in request.runs:
+    for name, label in request.labels.items():
         network = _network_of(request, name)
-        a = fabric.anisotropy(fabric.fabric_tensor(network.contacts))
-        circles[name] = states.mohr(network.z, a, dimension=network.contacts.dimension)
+        tensor = fabric.enriched_tensor(fabric.fabric_tensor(network.contacts), network.z)
+        circles[label] = states.MohrCircle.from_tensor(tensor)
     return plots.mohr(circles, domain=_domain(request))
 
 
@@ -156,9 +163,9 @@ def _rose(request: Request) -> Axes:
     from granufab import fabric, plots
 
     roses = {}
-    for name in request.runs:
+    for name, label in request.labels.items():
         network = _network_of(request, name)
-        roses[name] = fabric.orientation(network.contacts, z=network.z)
+        roses[label] = fabric.orientation(network.contacts, z=network.z)
     return plots.rose(roses if len(roses) > 1 else next(iter(roses.values())))
 
 

@@ -56,7 +56,8 @@ def mohr(
             ax.plot([circle.centre], [0], "+", color=line.get_color(), ms=5, zorder=3)
             _draw_inner(ax, circle, line.get_color())
         if domain is None and circles:
-            top = 1.45 * max(circle.radius for circle in circles.values())  # room for the legend
+            widest = max(max(c.radius, 0.05 * c.p_G) for c in circles.values())  # a point has none
+            top = 1.45 * widest  # room for the legend
             ax.update_datalim([(circle.centre, top) for circle in circles.values()])
             ax.autoscale_view()
         if domain is not None:
