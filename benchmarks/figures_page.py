@@ -262,7 +262,7 @@ def fig7(result: Result) -> str:
 def fig8(result: Result) -> str:
     """By friction."""
     fits = result["fits"]
-    header = ("µ", "z*", "a*", "a*z*", "z_min", "z_max")
+    header = ("µ", "z*", "a*", "a*z*", "z_min", "z_max", "approach: slope, z_max")
     rows = [
         (
             f"{fit['friction']:g}",
@@ -271,6 +271,7 @@ def fig8(result: Result) -> str:
             number(fit["z_star"]["value"] * fit["a_star"]["value"], 2),
             interval(fit["z_min"], 2),
             interval(fit["z_max"], 2),
+            _line(fit["approach"]),
         )
         for fit in fits
     ]
@@ -288,6 +289,11 @@ def fig8(result: Result) -> str:
         ),
     ]
     return table(rows, header) + "\n\n" + compared(verdicts)
+
+
+def _line(approach: dict[str, float] | None) -> str:
+    """Slope and intercept of the approach."""
+    return "–" if approach is None else f"{approach['slope']:.2f}, {approach['z_max']:.2f}"
 
 
 def _trend(values: np.ndarray, sign: int) -> str:

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from granufab.plots import new_figure, zaz
-from granufab.reproduce.recipe import Outcome, PathRecipe, Recipe
+from granufab.reproduce.recipe import Outcome, PathRecipe, Recipe, column
 from granufab.reproduce.report import fit_entry
 
 __all__ = ["FRICTIONS", "RECIPE"]
 
 FRICTIONS = (0.1, 0.3, 0.5, 0.7, 0.9)
+APPROACHED, FEWEST_RECORDS = 0.9, 4
 
 
 def _draw(outcome: Outcome) -> Figure:
@@ -33,8 +35,31 @@ def _draw(outcome: Outcome) -> Figure:
 def _extra(outcome: Outcome) -> dict[str, Any]:
     fits = []
     for path in outcome.recipe.paths:
-        fits.append({"friction": path.friction, **fit_entry(outcome.path_fits[path.name])})
+        entry = {"friction": path.friction, **fit_entry(outcome.path_fits[path.name])}
+        fits.append({**entry, "approach": _approach(outcome, path.name)})
     return {"fits": fits}
+
+
+def _approach(outcome: Outcome, name: str) -> dict[str, float] | None:
+    """Straight line a z = s (z_max − z) through the approach to the critical state.
+
+    Least squares over the records before a z first reaches 90 % of its critical value; on the
+    gain-saturation line s = 2. None where the path has too few records there, or does not come
+    down in z by 0.1.
+    """
+    fit = outcome.path_fits[name]
+    z_star, a_star = fit.z_star.value, fit.a_star.value
+    points = []
+    for run in outcome.runs[name]:
+        z, a = (column(run.series, key) for key in (outcome.z_definition, "a_signed"))
+        reached = np.flatnonzero(a * z >= APPROACHED * a_star * z_star)
+        end = int(reached[0]) if len(reached) else len(z)
+        points.append(np.column_stack([z[:end], (a * z)[:end]]))
+    z, az = np.concatenate(points).T
+    if len(z) < FEWEST_RECORDS or z.max() - z_star < 0.1:
+        return None
+    slope, height = np.polyfit(z, az, 1)
+    return {"slope": -float(slope), "z_max": -float(height / slope), "records": float(len(z))}
 
 
 RECIPE = Recipe(
