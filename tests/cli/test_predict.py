@@ -186,6 +186,9 @@ def test_spheres_report_b(granufab, tmp_path: Path, law_file: Path) -> None:
         ("[start]\nz=3.5\na=3\n[[path]]\n", ("a' is 3",)),
         ("[sample]\ncoordination=3.5\ndimension=3\n[[path]]\n", ("dimension", "2D")),
         ("[sample]\ngrain_count=9\n[[path]]\n", ("coordination",)),
+        ("[start]\nfabric=[[1,0.5],[0,1]]\n[[path]]\n", ("fabric", "symmetric")),
+        ("[start]\nfabric=[[2,0],[0,-0.5]]\n[[path]]\n", ("fabric", "negative")),
+        ("interval=1e-9\n[start]\nz=3.5\n[[path]]\n", ("interval", "3e-06")),
         ("[start\n", ("TOML",)),
     ],
 )

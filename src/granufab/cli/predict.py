@@ -63,9 +63,12 @@ def predict(
         print(
             f"granufab: {path}: {history.skipped} stage(s) without shear left out", file=sys.stderr
         )
-    result = law.predict(
-        history.fabric, history.stages, surplus=history.surplus, direction=history.direction
-    )
+    try:
+        result = law.predict(
+            history.fabric, history.stages, surplus=history.surplus, direction=history.direction
+        )
+    except InvalidSettings as error:
+        raise InvalidSettings(f"{path}: {error}") from None
     rows = _rows(result)
     if json:
         print_json(rows)

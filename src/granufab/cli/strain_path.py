@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -16,6 +14,7 @@ from granufab.errors import InvalidSettings
 from granufab.packing import Array
 from granufab.simulate.loading import ConstantMean, SimpleShear
 from granufab.simulate.settings import Case, load_case
+from granufab.simulate.settings_file import describe_error, read_toml
 from granufab.states import StrainStage, fabric_from_state
 
 __all__ = ["TEMPLATE", "StrainPath", "load_strain_path"]
@@ -48,6 +47,7 @@ strain = -0.3
 # strain = 0.1
 """
 _CASE_SECTIONS = {"schema_version", "name", "sample", "material", "solver", "record"}
+_MOST_STATES = 100_000
 _SHEAR = ("simple-shear", "simple-shear-volume")
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Matrix = tuple[tuple[Finite, ...], ...]
@@ -124,20 +124,13 @@ def load_strain_path(file: Path, dimension: int) -> StrainPath:
         InvalidSettings: the file is missing, is no TOML, or holds a bad value; a case of another
             dimension, without a wanted coordination, or with isotropic stages only.
     """
-    try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InvalidSettings(f"{file}: no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidSettings(f"{file}: cannot be read ({error})") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidSettings(f"{file}: not valid TOML: {error}") from None
+    data = read_toml(file)
     try:
         if _CASE_SECTIONS & set(data):
             return _of_case(load_case(file), dimension)
         return _of_file(_PathFile.model_validate(data), dimension)
     except ValidationError as error:
-        raise InvalidSettings(f"{file}: {_describe(error)}") from None
+        raise InvalidSettings(f"{file}: {describe_error(error, _PathFile)}") from None
     except InvalidSettings as error:
         text = str(error)
         raise InvalidSettings(text if text.startswith(str(file)) else f"{file}: {text}") from None
@@ -165,6 +158,12 @@ def _of_case(case: Case, dimension: int) -> StrainPath:
 
 
 def _of_file(file: _PathFile, dimension: int, skipped: int = 0) -> StrainPath:
+    walked = sum(abs(stage.strain) for stage in file.path)
+    if walked / file.interval > _MOST_STATES:
+        raise InvalidSettings(
+            f"interval is {file.interval:g}, which makes more than {_MOST_STATES:,} states of "
+            f"the strain {walked:g}; make it at least {walked / _MOST_STATES:.2g}"
+        )
     gradients = [_gradient(stage, dimension, number) for number, stage in enumerate(file.path)]
     stages = []
     for stage, (gradient, _) in zip(file.path, gradients, strict=True):
@@ -216,17 +215,3 @@ def _matrix(rows: Matrix, dimension: int, name: str) -> Array:
     if [len(row) for row in rows] != [dimension] * dimension:
         raise InvalidSettings(f"{name} must be {dimension} rows of {dimension} numbers")
     return np.array(rows, dtype=np.float64)
-
-
-def _describe(error: ValidationError) -> str:
-    first = error.errors()[0]
-    place = [str(part) for part in first["loc"]]
-    location = ".".join(place)
-    if first["type"] == "extra_forbidden":
-        section = {"start": _Start, "path": _Stage}.get(place[0], _PathFile)
-        known = list((section if len(place) > 1 else _PathFile).model_fields)
-        near = difflib.get_close_matches(place[-1], known, n=1, cutoff=0.0)
-        return f"unknown key {location}; did you mean {near[0]}? (known: {', '.join(known)})"
-    message = first["msg"].removeprefix("Value error, ")
-    got = "" if first["type"] in ("value_error", "missing") else f", got {first['input']!r}"
-    return f"{location}: {message}{got}" if location else message

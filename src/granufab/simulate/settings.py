@@ -6,7 +6,6 @@ diameter in m, density in kg/m³ (2D: kg/m² of disk area), pressure in Pa (2D: 
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 from pathlib import Path
@@ -22,6 +21,7 @@ from pydantic import (
 )
 
 from granufab.errors import InvalidSettings
+from granufab.simulate.settings_file import describe_error, read_toml
 
 __all__ = [
     "Case",
@@ -271,14 +271,7 @@ def load_case(path: Path | str, overrides: tuple[str, ...] = ()) -> Case:
         InvalidSettings: the file is missing, is no TOML, or holds a bad value.
     """
     path = Path(path)
-    try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InvalidSettings(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidSettings(f"{path}: cannot be read ({error})") from None
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidSettings(f"{path}: not valid TOML: {error}") from None
+    data = read_toml(path)
     for text in overrides:
         _assign(data, text)
     return parse_case(data, where=str(path))
@@ -293,7 +286,7 @@ def parse_case(data: dict[str, Any], *, where: str = "settings") -> Case:
     try:
         return Case.model_validate(data)
     except ValidationError as error:
-        raise InvalidSettings(f"{where}: {_describe(error)}") from None
+        raise InvalidSettings(f"{where}: {describe_error(error, Case)}") from None
 
 
 def _assign(data: dict[str, Any], text: str) -> None:
@@ -318,29 +311,6 @@ def _assign(data: dict[str, Any], text: str) -> None:
     if isinstance(target, list):
         raise InvalidSettings(f"--set {text}: name the stage, for example path.0.{last}")
     target[last] = parsed
-
-
-def _describe(error: ValidationError) -> str:
-    first = error.errors()[0]
-    location = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "extra_forbidden":
-        known = _known_names(first["loc"])
-        near = difflib.get_close_matches(str(first["loc"][-1]), known, n=1, cutoff=0.0)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        return f"unknown key {location}{hint} (known: {', '.join(known)})"
-    message = first["msg"].removeprefix("Value error, ")
-    got = "" if first["type"] == "value_error" else f", got {first['input']!r}"
-    return f"{location}: {message}{got}" if location else message
-
-
-def _known_names(location: tuple[int | str, ...]) -> list[str]:
-    model: Any = Case
-    for part in location[:-1]:
-        if isinstance(part, int):
-            continue
-        annotation = model.model_fields[part].annotation
-        model = Stage if part == "path" else annotation
-    return list(model.model_fields)
 
 
 def to_toml(case: Case, *, comments: bool = False) -> str:

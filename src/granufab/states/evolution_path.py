@@ -82,8 +82,8 @@ def predict_evolution(
         a_signed, b_g (3D), stage, and ``fabric`` G over (record, row, column). The end of a
         stage and the start of the next are one record.
     Raises:
-        InvalidSettings: tensors of another dimension, G not symmetric or without a positive
-            trace, or a first stage without a deviatoric strain rate.
+        InvalidSettings: tensors of another dimension, G not symmetric, with a negative principal
+            value or without a positive trace, or a first stage without a deviatoric strain rate.
         NotConverged: the integrator failed.
     """
     matrix = _checked(fabric, law, stages)
@@ -117,6 +117,11 @@ def _checked(fabric: ArrayLike, law: EvolutionLaw, stages: Sequence[StrainStage]
         raise InvalidSettings(f"fabric has shape {matrix.shape}, the law needs {shape}")
     if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-9) or not np.trace(matrix) > 0.0:
         raise InvalidSettings("fabric must be symmetric with trace z/2 > 0")
+    if np.linalg.eigvalsh(matrix)[0] < -1e-9:
+        raise InvalidSettings(
+            f"fabric has the principal values {np.linalg.eigvalsh(matrix).tolist()}, none may be "
+            "negative"
+        )
     if not stages:
         raise InvalidSettings("a strain history needs at least one stage, got none")
     for number, stage in enumerate(stages):
