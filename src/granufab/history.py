@@ -23,6 +23,7 @@ __all__ = [
     "Run",
     "StepStatistics",
     "frame_before",
+    "packing_of",
     "series_dataset",
 ]
 
@@ -107,6 +108,11 @@ class Frame:
     statistics: StepStatistics = StepStatistics()
     remap: Array | None = None
     extension: Array | None = None
+
+
+def packing_of(state: Frame | Packing) -> Packing:
+    """The packing of a frame, or the packing itself."""
+    return state.packing if isinstance(state, Frame) else state
 
 
 class FrameSource(Protocol):

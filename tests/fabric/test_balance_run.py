@@ -18,8 +18,9 @@ from granufab.fabric import (
     select_contacts,
 )
 from granufab.fabric.affine import mean_gradient
-from granufab.fabric.contact_identity import ContactRule, follow_contacts, lattice_change
+from granufab.fabric.contact_identity import ContactRule, follow_contacts
 from granufab.fabric.criterion import Criterion
+from granufab.fabric.lattice import lattice_change
 from granufab.history import Frame, Run
 from granufab.packing import Cell, Grains, Packing
 from granufab.simulate import Record, Solver, compress, random_sample, shear

@@ -41,6 +41,20 @@ def test_affine_motion_leaves_nothing(rate, wrapped):
     np.testing.assert_allclose(packings["strain"], data["strain"], rtol=0.02)
 
 
+@pytest.mark.parametrize("degrees", [20, 50, 90])
+def test_a_rigid_rotation_of_bare_packings_leaves_nothing(degrees):
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    position = 4 * np.random.default_rng(1).random((50, 2))
+    before, after = (
+        Packing(
+            grains=Grains(position=position @ q.T, radius=np.full(50, 0.1)), cell=Cell(matrix=4 * q)
+        )
+        for q in (np.eye(2), turn)
+    )
+    np.testing.assert_allclose(nonaffine_displacement(before, after), 0, atol=1e-12)
+
+
 def test_displacements_are_those_put_in():
     step = drawn(1)(0, np.zeros((100, 2)))
     before, after = frames(

@@ -30,7 +30,9 @@ OPTIONAL = ("velocity", "spin", "branch", "gap", "force", "image", "contacts", "
     dimension=st.sampled_from([2, 3]),
     contact_counts=st.lists(st.integers(0, 300), min_size=1, max_size=4),
     wall_counts=st.lists(st.none() | st.integers(0, 40), min_size=4, max_size=4),
-    lacks=st.lists(st.sets(st.sampled_from([*OPTIONAL, "remap", "extension"])), min_size=4, max_size=4),
+    lacks=st.lists(
+        st.sets(st.sampled_from([*OPTIONAL, "remap", "extension"])), min_size=4, max_size=4
+    ),
 )
 def test_random_frames_come_back_bit_for_bit(
     tmp_path: Path,

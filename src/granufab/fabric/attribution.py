@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from granufab.fabric.affine import affine_turning
+from granufab.fabric.tensors import axial_anisotropy
 from granufab.packing import Array
 
 __all__ = ["attribute", "fabric_term"]
@@ -25,8 +26,7 @@ def fabric_term(normal: Array, direction: Array) -> Array:
         normal: unit vectors, shape (contact_count, D).
         direction: unit vector d, shape (D,).
     """
-    square = (normal @ direction) ** 2
-    return 2.0 * (2.0 * square - 1.0) if len(direction) == 2 else 1.25 * (3.0 * square - 1.0)
+    return axial_anisotropy((normal @ direction) ** 2, len(direction))
 
 
 def _turning_term(normal: Array, direction: Array, gradient: Array) -> Array:

@@ -24,14 +24,13 @@ from granufab.fabric.contact_identity import (
     ContactRule,
     IdentifiedContacts,
     follow_contacts,
-    lattice_changes,
-    packing_of,
     persistent,
 )
 from granufab.fabric.coordination import ZDefinition, check_definition
 from granufab.fabric.criterion import Criterion, parse_criterion
 from granufab.fabric.direction_bins import DirectionBins
-from granufab.history import Frame
+from granufab.fabric.lattice import lattice_changes
+from granufab.history import Frame, packing_of
 from granufab.packing import Array, Packing
 
 __all__ = ["balance", "balance_attributes", "balance_coordinates", "balance_item", "count_balance"]

@@ -22,11 +22,11 @@ from granufab.fabric.contact_identity import (
     ContactRule,
     IdentifiedContacts,
     follow_contacts,
-    lattice_change,
 )
 from granufab.fabric.coordination import ZDefinition, check_definition
 from granufab.fabric.criterion import Criterion, parse_criterion
 from granufab.fabric.direction_bins import DirectionBins
+from granufab.fabric.lattice import lattice_change
 from granufab.fabric.run_definitions import recorded_reach
 from granufab.history import Run
 from granufab.packing import Array, IntArray, Packing

@@ -11,7 +11,7 @@ from granufab.fabric.coordination import ZDefinition
 from granufab.fabric.criterion import Criterion
 from granufab.fabric.neighbours import cell_fractions, wrap
 from granufab.fabric.network import Network, select_network
-from granufab.fabric.tensors import fabric_tensor, major_direction
+from granufab.fabric.tensors import axial_anisotropy, fabric_tensor, major_direction
 from granufab.packing import Array, IntArray, Packing
 
 __all__ = ["bootstrap_errors", "network_errors"]
@@ -100,7 +100,7 @@ def network_errors(
     with np.errstate(invalid="ignore", divide="ignore"):
         z = ends / grains
         square = along / all_ends
-    a = 2.0 * (2.0 * square - 1.0) if packing.dimension == 2 else 1.25 * (3.0 * square - 1.0)
+    a = axial_anisotropy(square, packing.dimension)
     # Sampling with replacement from B blocks shrinks the variance by (B − 1)/B.
     scale = math.sqrt(blocks / (blocks - 1))
     resampled = {"z": z, "a_signed": a, "az": a * z, "rattler_fraction": 1.0 - held / everything}

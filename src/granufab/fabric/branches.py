@@ -24,11 +24,11 @@ from granufab.fabric.directional import (
 from granufab.fabric.ensemble import (
     ContactSample,
     States,
-    describe,
     pool_contacts,
     resample,
     unit_sums,
 )
+from granufab.fabric.variables import describe
 from granufab.packing import Array
 
 __all__ = ["branches"]

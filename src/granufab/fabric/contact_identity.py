@@ -7,7 +7,7 @@ C_now = C T, images are brought back to the lattice vectors before the remap, T�
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,6 @@ from granufab.errors import InvalidPacking, InvalidSettings
 from granufab.fabric.coordination import ZDefinition, coordination, counted_contacts
 from granufab.fabric.criterion import Criterion, select_contacts, wall_support
 from granufab.fabric.neighbours import branch_vectors
-from granufab.history import Frame
 from granufab.packing import Array, Contacts, IntArray, Packing
 
 __all__ = [
@@ -25,9 +24,6 @@ __all__ = [
     "IdentifiedContacts",
     "follow_contacts",
     "identify",
-    "lattice_change",
-    "lattice_changes",
-    "packing_of",
     "persistent",
 ]
 
@@ -110,62 +106,13 @@ class IdentifiedContacts:
         )
 
 
-def packing_of(state: Frame | Packing) -> Packing:
-    """The packing of a frame, or the packing itself."""
-    return state.packing if isinstance(state, Frame) else state
-
-
-def lattice_change(frame: Frame) -> IntArray:
-    """Integer change T of the lattice vectors since the run began, C_now = C T, shape (D, D)."""
-    if frame.remap is None:
-        return np.eye(frame.packing.dimension, dtype=np.int64)
-    return np.rint(frame.remap).astype(np.int64)
-
-
-def lattice_changes(states: Sequence[Frame | Packing]) -> list[IntArray]:
-    """Integer change T of the lattice vectors of each state against a common first basis.
-
-    Frames hold it. Of two plain packings the second may have been remapped: of T = 1 and the
-    rounded C_1⁻¹C_2 the one with the smaller strain between the two is taken, which is right for
-    strains below about a half and for any rigid rotation.
-    """
-    dimension = packing_of(states[0]).dimension
-    frames = [state for state in states if isinstance(state, Frame)]
-    if len(frames) == len(states):
-        return [lattice_change(frame) for frame in frames]
-    same = np.eye(dimension, dtype=np.int64)
-    changes = [same]
-    first = packing_of(states[0]).cell
-    for state in states[1:]:
-        cell = packing_of(state).cell
-        if first is None or cell is None:
-            changes.append(same)
-        else:
-            changes.append(_remap(first.matrix, cell.matrix))
-    return changes
-
-
-def _remap(first: Array, second: Array) -> IntArray:
-    same = np.eye(len(first), dtype=np.int64)
-    nearest = np.rint(np.linalg.solve(first, second)).astype(np.int64)
-    if round(np.linalg.det(nearest)) != 1:
-        return same
-
-    def strain(change: IntArray) -> float:
-        gradient = second @ np.linalg.inv(change) @ np.linalg.inv(first)
-        stretch = np.linalg.svd(gradient, compute_uv=False)
-        return float(np.abs(np.log(stretch)).max())
-
-    return nearest if strain(nearest) < strain(same) - 1e-9 else same
-
-
 def identify(packing: Packing, contacts: Contacts, change: IntArray) -> IdentifiedContacts:
     """Contacts of a packing with their identity.
 
     Args:
         packing: the state; its grain ``number`` tells grains apart.
         contacts: some of its pairs; where they carry no image it follows from the branches.
-        change: T of :func:`lattice_changes`, shape (D, D).
+        change: T of :func:`~granufab.fabric.lattice.lattice_changes`, shape (D, D).
     Raises:
         InvalidPacking: two grains have one number, or one contact is listed twice.
     """
@@ -241,7 +188,7 @@ def follow_contacts(
     long as its gap is below ``keep`` in every state given; a made contact lasts in any case.
 
     Args:
-        states: packings, each with its T of :func:`lattice_changes`.
+        states: packings, each with its T of :func:`~granufab.fabric.lattice.lattice_changes`.
         rule: which contacts count.
     Raises:
         MissingData: a state lacks what the criterion needs.

@@ -20,6 +20,7 @@ from granufab.fabric.neighbours import neighbours_within
 from granufab.fabric.network import Network, select_network
 from granufab.fabric.run_definitions import run_definitions
 from granufab.fabric.tensors import anisotropy, fabric_tensor, signed_anisotropy
+from granufab.fabric.variables import describe
 from granufab.history import Frame, Run
 from granufab.packing import Array, Packing
 
@@ -41,8 +42,8 @@ _QUANTITIES = {
     "rattler_fraction": "fraction of rattlers",
 }
 _AXES: dict[Kind, tuple[str, str]] = {
-    "force": ("-", "least normal force of a contact, in mean normal forces"),
-    "gap": ("mean diameter", "largest gap of a contact"),
+    "force": ("least normal force of a contact, in mean normal forces", "-"),
+    "gap": ("largest gap of a contact", "mean diameter"),
 }
 _FEWEST_FOR_MEMORY = 6
 
@@ -127,7 +128,7 @@ def criterion_curves(
     return xr.Dataset(
         data,
         coords={
-            f"{kind}_threshold": (f"{kind}_threshold", thresholds[kind], _text(*_AXES[kind]))
+            f"{kind}_threshold": (f"{kind}_threshold", thresholds[kind], describe(*_AXES[kind]))
             for kind in thresholds
             if f"z_{kind}" in data
         },
@@ -278,8 +279,8 @@ def _curves(kind: Kind, tables: list[list[Row]], correlated: bool) -> dict:
         else:
             error = np.array([spread(column) for column in value.T])
         axis = f"{kind}_threshold"
-        data[f"{name}_{kind}"] = (axis, value.mean(axis=0), _text("-", text))
-        data[f"{name}_{kind}_error"] = (axis, error, _text("-", f"standard error of the {text}"))
+        data[f"{name}_{kind}"] = (axis, value.mean(axis=0), describe(text))
+        data[f"{name}_{kind}_error"] = (axis, error, describe(f"standard error of the {text}"))
     return data
 
 
@@ -308,7 +309,3 @@ def _error_text(count: int, replicas: int, correlated: bool) -> str:
     if count == 1:
         return f"{replicas} resamples of blocks of grains" if replicas else "none"
     return "between frames, their memory in strain allowed for" if correlated else "between states"
-
-
-def _text(units: str, long_name: str) -> dict[str, str]:
-    return {"units": units, "long_name": long_name}

@@ -14,7 +14,8 @@ import numpy as np
 
 from granufab.errors import InvalidPacking, InvalidSettings
 from granufab.fabric.criterion import mean_diameter
-from granufab.history import Frame, FrameSource, Run
+from granufab.fabric.lattice import lattice_change, lattice_remap
+from granufab.history import Frame, FrameSource, Run, packing_of
 from granufab.packing import Array, Cell, Packing, require
 
 __all__ = ["States", "Track", "follow", "mean_motion", "nonaffine_displacement", "select_states"]
@@ -37,7 +38,7 @@ def nonaffine_displacement(before: State, after: State) -> Array:
     Args:
         before: first state, with a cell.
         after: second state, the same grains. Frames tell the remap between them; for bare
-            packings it is found by rounding, which needs a strain below about 0.3.
+            packings it is found from the cells, which needs a strain below about a half.
     Returns:
         [m], shape (grain_count, D).
     Raises:
@@ -47,7 +48,7 @@ def nonaffine_displacement(before: State, after: State) -> Array:
     first = _lattice(before, None)
     last = _lattice(after, first)
     step = _step(before, after, first, last)
-    return _without_drift(step, _packing(before)) @ last.T
+    return _without_drift(step, packing_of(before)) @ last.T
 
 
 def mean_motion(before: State, after: State) -> Packing:
@@ -68,7 +69,7 @@ def mean_motion(before: State, after: State) -> Packing:
         InvalidPacking: the two states hold different grains or walls.
         MissingData: a state has no cell.
     """
-    old, new = _packing(before), _packing(after)
+    old, new = packing_of(before), packing_of(after)
     first = _lattice(before, None)
     last = _lattice(after, first)
     step = _step(before, after, first, last)
@@ -153,14 +154,14 @@ def follow(states: States, *, stage: int | None = None, strain: Range = None) ->
     if before is None:
         raise InvalidSettings("no state is in the wanted stage and range of strain")
     matrices = [_lattice(before, None)]
-    places = [_fractions(_packing(before), matrices[0])]
+    places = [_fractions(packing_of(before), matrices[0])]
     walked = [before.eps_q_total if isinstance(before, Frame) else 0.0]
-    packings = [replace(_packing(before), contacts=None, wall_contacts=None)]
+    packings = [replace(packing_of(before), contacts=None, wall_contacts=None)]
     for after in chosen:
         matrices.append(_lattice(after, matrices[-1]))
         places.append(places[-1] + _step(before, after, *matrices[-2:]))
         walked.append(_walked(after, walked[-1], *matrices[-2:]))
-        packings.append(replace(_packing(after), contacts=None, wall_contacts=None))
+        packings.append(replace(packing_of(after), contacts=None, wall_contacts=None))
         before = after
     keep = _even(np.array(walked))
     velocities = [p.grains.velocity for p in packings[:keep]]
@@ -233,10 +234,6 @@ def _each(states: States) -> Iterator[State]:
             yield frames[index]  # pyright: ignore[reportIndexIssue]
 
 
-def _packing(state: State) -> Packing:
-    return state.packing if isinstance(state, Frame) else state
-
-
 def _origin(packing: Packing) -> Array:
     origin = None if packing.cell is None else packing.cell.origin
     return np.zeros(packing.dimension) if origin is None else origin
@@ -244,12 +241,14 @@ def _origin(packing: Packing) -> Array:
 
 def _lattice(state: State, previous: Array | None) -> Array:
     """Lattice vectors in a basis that is followed through remaps."""
-    matrix = require(_packing(state).cell, "cell lengths", "give the cell of the packing").matrix
+    matrix = require(packing_of(state).cell, "cell lengths", "give the cell of the packing").matrix
     if isinstance(state, Frame) and state.remap is not None:
-        return matrix @ np.rint(np.linalg.inv(state.remap))
-    if previous is None:
+        change = lattice_change(state)
+    elif previous is None:
         return np.array(matrix)
-    return matrix @ np.rint(np.linalg.solve(matrix, previous))
+    else:
+        change = lattice_remap(previous, matrix)
+    return matrix @ np.rint(np.linalg.inv(change))
 
 
 def _fractions(packing: Packing, lattice: Array) -> Array:
@@ -259,7 +258,7 @@ def _fractions(packing: Packing, lattice: Array) -> Array:
 
 def _step(before: State, after: State, first: Array, last: Array) -> Array:
     """Change of the coordinates along the followed lattice vectors, nearest image."""
-    old, new = _packing(before), _packing(after)
+    old, new = packing_of(before), packing_of(after)
     if not np.array_equal(old.grains.number, new.grains.number):  # pyright: ignore[reportArgumentType]
         raise InvalidPacking("the two states hold different grains, so nothing can be compared")
     periodic = require(old.cell, "cell lengths").periodic

@@ -17,13 +17,12 @@ from granufab.fabric.neighbours import branch_vectors
 from granufab.fabric.network import Network, select_network
 from granufab.fabric.orientation import symmetry_axis
 from granufab.fabric.tensors import fabric_tensor, major_direction
-from granufab.history import Frame, Run
+from granufab.history import Frame, Run, packing_of
 from granufab.packing import Array, IntArray, Packing
 
 __all__ = [
     "ContactSample",
     "States",
-    "describe",
     "late_frames",
     "pool_contacts",
     "resample",
@@ -109,7 +108,7 @@ def state_list(states: States) -> list[Packing | Frame]:
     listed = [states] if isinstance(states, Packing | Frame) else list(states)
     if not listed:
         raise MissingData("there are no states to measure")
-    dimensions = {_packing(state).dimension for state in listed}
+    dimensions = {packing_of(state).dimension for state in listed}
     if len(dimensions) > 1:
         raise MissingData("the states are of different dimension, so they cannot be pooled")
     return listed
@@ -165,7 +164,7 @@ def pool_contacts(
     """
     listed = state_list(states)
     rule = parse_criterion(criterion)
-    packings = tuple(_packing(state) for state in listed)
+    packings = tuple(packing_of(state) for state in listed)
     networks = tuple(
         select_network(
             packing, criterion=rule, z_definition=z_definition, minimum=minimum, reach=reach
@@ -229,15 +228,6 @@ def resample(sums: Array, replicas: int, seed: int = 0) -> Array:
             draw[:] = np.bincount(generator.integers(0, count, count), minlength=count)
         rows.append(weight @ sums)
     return np.concatenate(rows)
-
-
-def describe(long_name: str, units: str = "-") -> dict[str, str]:
-    """Attributes of a variable."""
-    return {"units": units, "long_name": long_name}
-
-
-def _packing(state: Packing | Frame) -> Packing:
-    return state.packing if isinstance(state, Frame) else state
 
 
 def _axis(given: Iterable[float] | None, first: Packing | Frame, normal: Array) -> tuple:

@@ -10,7 +10,7 @@ from granufab.errors import MissingData
 from granufab.fabric.neighbours import branch_vectors
 from granufab.packing import Array, Contacts, IntArray, Packing
 
-__all__ = ["Environment", "environment"]
+__all__ = ["Environment", "environment", "opening_angle"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -59,12 +59,23 @@ def environment(packing: Packing, contacts: Contacts, grain: int) -> Environment
     following = np.roll(length, -1)
     radius = packing.grains.radius[neighbour]
     touching = radius + np.roll(radius, -1)
-    cosine = (length**2 + following**2 - touching**2) / (2 * length * following)
     return Environment(
         grain=grain,
         neighbour=neighbour,
         branch=links,
         angle=angle,
         step=np.mod(np.roll(angle, -1) - angle, 2 * np.pi),
-        exclusion=np.arccos(np.clip(cosine, -1.0, 1.0)),
+        exclusion=opening_angle(length, following, touching),
     )
+
+
+def opening_angle(one: Array, other: Array, opposite: Array) -> Array:
+    """Angle between two sides of a triangle, cos γ = (a² + b² − c²)/(2ab) [rad].
+
+    Args:
+        one: length a [m], any shape.
+        other: length b [m].
+        opposite: length c of the third side [m]; where it is too long the angle is π.
+    """
+    cosine = (one**2 + other**2 - opposite**2) / (2.0 * one * other)
+    return np.arccos(np.clip(cosine, -1.0, 1.0))

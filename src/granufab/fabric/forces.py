@@ -21,11 +21,12 @@ from granufab.fabric.criterion import Criterion
 from granufab.fabric.ensemble import (
     ContactSample,
     States,
-    describe,
     pool_contacts,
     resample,
     unit_sums,
 )
+from granufab.fabric.tensors import axial_anisotropy
+from granufab.fabric.variables import describe
 from granufab.packing import Array, require
 
 __all__ = ["force_statistics"]
@@ -156,9 +157,7 @@ class _Parts:
                 "strong_decay": 1.0 / mean,
                 "tail_variation": np.sqrt(np.maximum(square / above - mean**2, 0.0)) / mean,
                 "contact_share": count / count.sum(axis=1, keepdims=True),
-                "a": 2.0 * (2.0 * along - 1.0)
-                if self.dimension == 2
-                else 1.25 * (3.0 * along - 1.0),
+                "a": axial_anisotropy(along, self.dimension),
                 "p_share": pressure / pressure.sum(axis=1, keepdims=True),
                 "q_share": shear / shear.sum(axis=1, keepdims=True),
             }

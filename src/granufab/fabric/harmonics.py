@@ -14,6 +14,7 @@ import xarray as xr
 from scipy.special import lpmv
 
 from granufab.errors import InvalidSettings, MissingData
+from granufab.fabric.variables import describe
 from granufab.packing import Array, Contacts, IntArray
 
 __all__ = ["real_harmonics", "sphere_density", "sphere_orientation"]
@@ -86,7 +87,7 @@ def sphere_orientation(
     data = _terms(values) | _powers(values) | _cells(contacts.normal, z, rings)
     data |= _shares(data["power"][1], data["power_corrected"][1], np.array(list(values)))
     coordinates = {
-        "l": ("l", np.array(list(values)), _text("order of the harmonic")),
+        "l": ("l", np.array(list(values)), describe("order of the harmonic")),
         "term_l": ("term", np.concatenate([np.full(2 * o + 1, o) for o in values])),
         "term_m": ("term", np.concatenate([np.arange(-o, o + 1) for o in values])),
         "axis": ("axis", list("xyz")),
@@ -137,8 +138,8 @@ def _terms(values: dict[int, Array]) -> dict:
     columns = np.concatenate(list(values.values()), axis=1)
     error = columns.std(axis=0) / math.sqrt(len(columns))
     return {
-        "coefficient": ("term", columns.mean(axis=0), _text("c_lm of 1 + Σ c_lm Y_lm")),
-        "coefficient_error": ("term", error, _text("standard error of c_lm")),
+        "coefficient": ("term", columns.mean(axis=0), describe("c_lm of 1 + Σ c_lm Y_lm")),
+        "coefficient_error": ("term", error, describe("standard error of c_lm")),
     }
 
 
@@ -158,10 +159,10 @@ def _powers(values: dict[int, Array]) -> dict:
         corrected.append(known)
         error.append(math.sqrt(pairs + max(singles, 0.0)))
     return {
-        "power": ("l", np.array(power), _text("rotation-invariant power S_l = Σ_m c_lm²")),
-        "power_noise": ("l", np.array(noise), _text("part of S_l expected of the noise alone")),
-        "power_corrected": ("l", np.array(corrected), _text("S_l without its noise")),
-        "power_error": ("l", np.array(error), _text("standard error of the corrected S_l")),
+        "power": ("l", np.array(power), describe("rotation-invariant power S_l = Σ_m c_lm²")),
+        "power_noise": ("l", np.array(noise), describe("part of S_l expected of the noise alone")),
+        "power_corrected": ("l", np.array(corrected), describe("S_l without its noise")),
+        "power_error": ("l", np.array(error), describe("standard error of the corrected S_l")),
     }
 
 
@@ -172,11 +173,11 @@ def _shares(power: Array, corrected: Array, orders: IntArray) -> dict:
 
     text = "power above order 2 over that of all orders"
     return {
-        "share_above_2": ((), share(power), _text(text)),
+        "share_above_2": ((), share(power), describe(text)),
         "share_above_2_corrected": (
             (),
             share(np.maximum(corrected, 0.0)),
-            _text(f"{text}, expected noise taken off"),
+            describe(f"{text}, expected noise taken off"),
         ),
     }
 
@@ -193,10 +194,10 @@ def _cells(normal: Array, z: float, rings: int) -> dict:
     scale = 0.5 * z * len(count) / (len(normal) * 2.0 * math.pi)
     spread = np.sqrt(np.maximum(count * (1.0 - count / len(normal)), 1.0))
     return {
-        "direction": (("cell", "axis"), _cell_directions(rings), _text("middle of the cell")),
-        "count": ("cell", count, _text("contacts in the cell")),
-        "E": ("cell", scale * count, _text("contacts per grain and direction", "1/sr")),
-        "E_error": ("cell", scale * spread, _text("standard error of E", "1/sr")),
+        "direction": (("cell", "axis"), _cell_directions(rings), describe("middle of the cell")),
+        "count": ("cell", count, describe("contacts in the cell")),
+        "E": ("cell", scale * count, describe("contacts per grain and direction", "1/sr")),
+        "E_error": ("cell", scale * spread, describe("standard error of E", "1/sr")),
     }
 
 
@@ -208,7 +209,3 @@ def _cell_directions(rings: int) -> Array:
     azimuth = 2.0 * math.pi * (sector + 0.5) / (3 * (2 * ring + 1))
     sine = np.sqrt(1.0 - cosine**2)
     return np.column_stack([sine * np.cos(azimuth), sine * np.sin(azimuth), cosine])
-
-
-def _text(long_name: str, units: str = "-") -> dict[str, str]:
-    return {"units": units, "long_name": long_name}

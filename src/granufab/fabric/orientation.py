@@ -14,6 +14,7 @@ from scipy.special import eval_legendre
 
 from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.tensors import fabric_tensor
+from granufab.fabric.variables import describe
 from granufab.packing import Array, Contacts, IntArray
 
 __all__ = ["orientation", "symmetry_axis"]
@@ -100,7 +101,7 @@ def _plane(normal: Array, z: float, bins: int) -> xr.Dataset:
     noise = (4.0 - power) / max(len(normal) - 1, 1)
     data |= harmonics | _shares(power, noise)
     data["a"] = ((), a, {"units": "-", "long_name": "fabric anisotropy of mode 2"})
-    data["a_error"] = ((), harmonics["amplitude_error"][1][0], _text("standard error of a"))
+    data["a_error"] = ((), harmonics["amplitude_error"][1][0], describe("standard error of a"))
     return _dataset(data, theta, "orientation from the x axis")
 
 
@@ -115,13 +116,13 @@ def _fourier(angle: Array) -> dict:
         phase_error = np.degrees(across / amplitude) / _MODES
     phase = np.degrees(np.mod(np.angle(moment), 2.0 * math.pi) / _MODES)
     return {
-        "amplitude": ("mode", amplitude, _text("A_m of 1 + Σ A_m cos m(θ − θ_m)")),
-        "amplitude_error": ("mode", error, _text("standard error of A_m")),
-        "phase": ("mode", phase, _text("direction θ_m of mode m", "degree")),
+        "amplitude": ("mode", amplitude, describe("A_m of 1 + Σ A_m cos m(θ − θ_m)")),
+        "amplitude_error": ("mode", error, describe("standard error of A_m")),
+        "phase": ("mode", phase, describe("direction θ_m of mode m", "degree")),
         "phase_error": (
             "mode",
             np.minimum(phase_error, 180.0 / _MODES),
-            _text("standard error of θ_m, at most half its period", "degree"),
+            describe("standard error of θ_m, at most half its period", "degree"),
         ),
     }
 
@@ -140,11 +141,11 @@ def _sphere(normal: Array, z: float, bins: int, axis: Array | None) -> xr.Datase
     # Mean of u² over a bin of width w is u² + w²/12.
     mean = fit + amplitude[0] * 1.5 / (12.0 * bins**2)
     data = _binned(np.bincount(index, minlength=bins), z, 2.0 * math.pi, fit, mean)
-    data["amplitude"] = ("mode", amplitude, _text("A_l of 1 + Σ A_l P_l(cos θ)"))
-    data["amplitude_error"] = ("mode", error, _text("standard error of A_l"))
+    data["amplitude"] = ("mode", amplitude, describe("A_l of 1 + Σ A_l P_l(cos θ)"))
+    data["amplitude_error"] = ("mode", error, describe("standard error of A_l"))
     data |= _shares(amplitude**2 / factor, error**2 / factor)
-    data["a"] = ((), 0.5 * amplitude[0], _text("signed fabric anisotropy along the axis"))
-    data["a_error"] = ((), 0.5 * error[0], _text("standard error of a"))
+    data["a"] = ((), 0.5 * amplitude[0], describe("signed fabric anisotropy along the axis"))
+    data["a_error"] = ((), 0.5 * error[0], describe("standard error of a"))
     dataset = _dataset(data, np.arccos(middle), "polar angle from the axis")
     return dataset.assign_attrs(axis=direction)
 
@@ -158,11 +159,11 @@ def _binned(count: IntArray, z: float, whole: float, fit: Array, mean: Array) ->
     misfit = float(np.sum((count - expected) ** 2 / expected)) / max(bins - 3, 1)
     unit = "1/rad" if whole < 4.0 else "1/sr"
     return {
-        "count": ("theta", count, _text("contacts in the bin")),
-        "E": ("theta", scale * count, _text("contacts per grain and direction", unit)),
-        "E_error": ("theta", scale * spread, _text("standard error of E", unit)),
-        "E_fit": ("theta", 0.5 * z / whole * fit, _text("second-order fit of E", unit)),
-        "misfit": ((), misfit, _text("reduced χ² of the second-order fit")),
+        "count": ("theta", count, describe("contacts in the bin")),
+        "E": ("theta", scale * count, describe("contacts per grain and direction", unit)),
+        "E_error": ("theta", scale * spread, describe("standard error of E", unit)),
+        "E_fit": ("theta", 0.5 * z / whole * fit, describe("second-order fit of E", unit)),
+        "misfit": ((), misfit, describe("reduced χ² of the second-order fit")),
     }
 
 
@@ -171,24 +172,20 @@ def _shares(power: Array, noise: Array) -> dict:
         return float(values[1:].sum() / values.sum()) if values.sum() > 0 else 0.0
 
     return {
-        "share_above_2": ((), share(power), _text("power of modes 4, 6 over that of 2, 4, 6")),
+        "share_above_2": ((), share(power), describe("power of modes 4, 6 over that of 2, 4, 6")),
         "share_above_2_corrected": (
             (),
             share(np.maximum(power - noise, 0.0)),
-            _text("the same, expected noise power taken off each mode"),
+            describe("the same, expected noise power taken off each mode"),
         ),
     }
-
-
-def _text(long_name: str, units: str = "-") -> dict[str, str]:
-    return {"units": units, "long_name": long_name}
 
 
 def _dataset(data: dict, theta: Array, text: str) -> xr.Dataset:
     return xr.Dataset(
         data,
         coords={
-            "theta": ("theta", theta, _text(text, "rad")),
-            "mode": ("mode", _MODES, _text("order of the harmonic")),
+            "theta": ("theta", theta, describe(text, "rad")),
+            "mode": ("mode", _MODES, describe("order of the harmonic")),
         },
     )

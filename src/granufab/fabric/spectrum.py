@@ -11,6 +11,7 @@ from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.displacements import Range, States, Track, follow
 from granufab.fabric.fluctuations import samples
 from granufab.fabric.relative_velocity import Tally, cluster_error
+from granufab.fabric.variables import describe
 from granufab.packing import Array
 
 __all__ = ["fluctuation_spectrum"]
@@ -141,20 +142,20 @@ def _dataset(tally: Tally, dimension: int, fit: tuple[float, float]) -> xr.Datas
         share = dimension * along / whole[2]
     slope, slope_error = _slope(length, power, error, fit)
     data: dict[str, Any] = {
-        "S": ("k", power, _text("power of the non-affine displacements")),
-        "S_error": ("k", error, _text("standard error of S")),
-        "modes": ("k", number, _text("wave vectors in the shell, over all windows")),
-        "longitudinal": ("k", share, _text("share along k times the dimension")),
+        "S": ("k", power, describe("power of the non-affine displacements")),
+        "S_error": ("k", error, describe("standard error of S")),
+        "modes": ("k", number, describe("wave vectors in the shell, over all windows")),
+        "longitudinal": ("k", share, describe("share along k times the dimension")),
         "longitudinal_error": (
             "k",
             dimension * cluster_error(clusters[:, 3], clusters[:, 2]),
-            _text("standard error of longitudinal"),
+            describe("standard error of longitudinal"),
         ),
-        "slope": ((), slope, _text("s of S ~ k^-s")),
-        "slope_error": ((), slope_error, _text("standard error of slope")),
-        "line_slope": ((), slope - dimension + 1, _text("exponent of the spectrum on a line")),
+        "slope": ((), slope, describe("s of S ~ k^-s")),
+        "slope_error": ((), slope_error, describe("standard error of slope")),
+        "line_slope": ((), slope - dimension + 1, describe("exponent of the spectrum on a line")),
     }
-    words = _text("wave number times mean diameter")
+    words = describe("wave number times mean diameter")
     result = xr.Dataset(data, coords={"k": ("k", length, words)})
     return result.assign_attrs(fit=fit, dimension=dimension)
 
@@ -171,7 +172,3 @@ def _slope(
     coefficients, covariance = np.polyfit(x, y, 1, w=weight, cov="unscaled")
     misfit = float((((y - np.polyval(coefficients, x)) * weight) ** 2).sum()) / (keep.sum() - 2)
     return -float(coefficients[0]), float(np.sqrt(covariance[0, 0] * max(1.0, misfit)))
-
-
-def _text(long_name: str) -> dict[str, str]:
-    return {"units": "-", "long_name": long_name}

@@ -29,12 +29,12 @@ from granufab.fabric.directional import (
 from granufab.fabric.ensemble import (
     ContactSample,
     States,
-    describe,
     pool_contacts,
     resample,
     unit_sums,
 )
 from granufab.fabric.stress import stress_ratio, stress_tensor
+from granufab.fabric.variables import describe
 from granufab.packing import Array, require
 
 __all__ = ["anisotropy_stress_ratio", "stress_force_fabric"]

@@ -7,6 +7,7 @@ a' = (5/4)<3 (n·d)² − 1>; the printed form lacks a factor 1/2.
 from __future__ import annotations
 
 import math
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ __all__ = [
     "anisotropy",
     "anisotropy_bias",
     "anisotropy_noise",
+    "axial_anisotropy",
     "deviatoric_part",
     "enriched_tensor",
     "fabric_tensor",
@@ -28,6 +30,9 @@ __all__ = [
     "principal_values",
     "signed_anisotropy",
 ]
+
+
+T = TypeVar("T", float, Array)
 
 
 def fabric_tensor(contacts: Contacts | Array) -> Array:
@@ -117,7 +122,17 @@ def signed_anisotropy(fabric: Array, direction: Array, *, minor: Array | None = 
     along = _along(fabric, direction)
     if minor is not None:
         return (2.0 if len(fabric) == 2 else 2.5) * (along - _along(fabric, minor))
-    return 2.0 * (2.0 * along - 1.0) if len(fabric) == 2 else 1.25 * (3.0 * along - 1.0)
+    return axial_anisotropy(along, len(fabric))
+
+
+def axial_anisotropy(square: T, dimension: int) -> T:
+    """a' from the mean of (n·d)²: 2(2<(n·d)²> − 1) in 2D, (5/4)(3<(n·d)²> − 1) in 3D [-].
+
+    Args:
+        square: <(n·d)²> [-]; of a single contact, its term of the mean.
+        dimension: 2 or 3.
+    """
+    return 2.0 * (2.0 * square - 1.0) if dimension == 2 else 1.25 * (3.0 * square - 1.0)
 
 
 def _along(tensor: Array, direction: Array) -> float:

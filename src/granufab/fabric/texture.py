@@ -13,9 +13,11 @@ import xarray as xr
 from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.coordination import ZDefinition
 from granufab.fabric.criterion import Criterion, select_contacts
-from granufab.fabric.ensemble import ContactSample, States, describe, pool_contacts
+from granufab.fabric.ensemble import ContactSample, States, pool_contacts
+from granufab.fabric.environment import opening_angle
 from granufab.fabric.rattlers import contact_number
 from granufab.fabric.tensors import anisotropy, fabric_tensor, major_angle, signed_anisotropy
+from granufab.fabric.variables import describe
 from granufab.packing import Array, IntArray
 
 __all__ = ["texture"]
@@ -194,8 +196,7 @@ def _pairs_within(grain: IntArray, start: IntArray) -> tuple[IntArray, IntArray]
 
 def _exclusion_angle(radius: Array, first: Array, second: Array) -> Array:
     """Smallest angle between two grains that touch a third one [rad]."""
-    one, two, across = radius + first, radius + second, first + second
-    return np.arccos(np.clip((one**2 + two**2 - across**2) / (2.0 * one * two), -1.0, 1.0))
+    return opening_angle(radius + first, radius + second, first + second)
 
 
 def _density(angle: Array, edges: Array, name: str, text: str) -> dict:

@@ -21,7 +21,8 @@ from granufab.fabric.relative_velocity import (
     pair_motion,
     reach_limit,
 )
-from granufab.history import Frame
+from granufab.fabric.variables import describe
+from granufab.history import packing_of
 from granufab.packing import Array, Cell, Packing, require
 
 __all__ = ["velocity_field"]
@@ -125,17 +126,13 @@ def _motions(
     for state in states:
         since += 1
         if window == 0:
-            packing = _packing(state)
+            packing = packing_of(state)
             yield packing, _mean_branch(packing, rule)
         elif before is None:
             before, since = state, 0
         elif since == window:
-            yield mean_motion(before, state), _mean_branch(_packing(before), rule)
+            yield mean_motion(before, state), _mean_branch(packing_of(before), rule)
             before, since = state, 0
-
-
-def _packing(state: State) -> Packing:
-    return state.packing if isinstance(state, Frame) else state
 
 
 def _mean_branch(packing: Packing, rule: Criterion) -> float:
@@ -213,24 +210,24 @@ def _dataset(sums: PairSums) -> xr.Dataset:
     if sums.section.kind != "axisymmetric":
         x = x - sums.reach
     data: dict[str, Any] = {
-        "velocity": (field, affine + difference, _text("mean relative velocity", _VELOCITY)),
-        "affine": (field, affine, _text("its affine part", _VELOCITY)),
-        "difference": (field, difference, _text("velocity less its affine part", _VELOCITY)),
+        "velocity": (field, affine + difference, describe("mean relative velocity", _VELOCITY)),
+        "affine": (field, affine, describe("its affine part", _VELOCITY)),
+        "difference": (field, difference, describe("velocity less its affine part", _VELOCITY)),
         "error": (
             field,
             cluster_error(maps[:, 5:7], counts),
-            _text("standard error of velocity and difference", _VELOCITY),
+            describe("standard error of velocity and difference", _VELOCITY),
         ),
-        "position": (field, position, _text("mean place of the pairs", "mean branch length")),
-        "count": (("y", "x"), count, _text("pairs in the box, both ways round", "-")),
+        "position": (field, position, describe("mean place of the pairs", "mean branch length")),
+        "count": (("y", "x"), count, describe("pairs in the box, both ways round", "-")),
     }
     data |= _profile(sums) | _far_field(sums)
     shells = (np.arange(sums.shells.by_block.shape[2]) + 0.5) * SHELL
     coordinates = {
-        "x": ("x", x, _text(_axis_names(sums.section)[0], "mean branch length")),
-        "y": ("y", y, _text(_axis_names(sums.section)[1], "mean branch length")),
+        "x": ("x", x, describe(_axis_names(sums.section)[0], "mean branch length")),
+        "y": ("y", y, describe(_axis_names(sums.section)[1], "mean branch length")),
         "component": ["x", "y"],
-        "distance": ("distance", shells, _text("distance of the pair", "mean branch length")),
+        "distance": ("distance", shells, describe("distance of the pair", "mean branch length")),
     }
     return xr.Dataset(data, coords=coordinates)
 
@@ -245,15 +242,15 @@ def _profile(sums: PairSums) -> dict[str, Any]:
     shells = sums.shells.clusters
     total = shells.sum(axis=0)
     data: dict[str, Any] = {
-        "pair_count": ("distance", total[0], _text("pairs in the shell, each once", "-"))
+        "pair_count": ("distance", total[0], describe("pairs in the shell, each once", "-"))
     }
     for name, k, text in (("normal", 1, "along"), ("tangential", 3, "across")):
         with np.errstate(invalid="ignore", divide="ignore"):
             share = total[k] / total[k + 1]
         error = cluster_error(shells[:, k], shells[:, k + 1])
         words = f"relative velocity {text} the branch over its affine value"
-        data[f"{name}_share"] = ("distance", share, _text(words, "-"))
-        data[f"{name}_share_error"] = ("distance", error, _text("standard error of it", "-"))
+        data[f"{name}_share"] = ("distance", share, describe(words, "-"))
+        data[f"{name}_share_error"] = ("distance", error, describe("standard error of it", "-"))
     return data
 
 
@@ -270,11 +267,7 @@ def _far_field(sums: PairSums) -> dict[str, Any]:
     pairs, unit = ("i", "j"), "deviatoric strain rate"
     rate = sums.rate / sums.maps.states
     return {
-        "rate": (pairs, rate, _text("imposed velocity gradient", unit)),
-        "rate_far": (pairs, rate + excess, _text("velocity gradient of the far field", unit)),
-        "rate_far_error": (pairs, error, _text("standard error of rate_far", unit)),
+        "rate": (pairs, rate, describe("imposed velocity gradient", unit)),
+        "rate_far": (pairs, rate + excess, describe("velocity gradient of the far field", unit)),
+        "rate_far_error": (pairs, error, describe("standard error of rate_far", unit)),
     }
-
-
-def _text(long_name: str, units: str) -> dict[str, str]:
-    return {"units": units, "long_name": long_name}
