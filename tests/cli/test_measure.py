@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from moving_run import moving_run
 
 
 def test_json_holds_one_object_per_state(granufab, run_file: Path) -> None:
@@ -49,6 +50,33 @@ def test_unknown_values_are_null(granufab, run_file: Path) -> None:
     done = granufab("measure", run_file, "--json", "--criterion", "gap:0.5")
     assert all(value == value for value in json.loads(done.out)[0].values())
     assert "NaN" not in done.out
+
+
+def test_spheres_have_b_and_forces_where_wanted(granufab, tmp_path: Path) -> None:
+    """Made-up spheres: exponential normal forces, none across, µ as in the case."""
+    run = moving_run(tmp_path / "run.h5", dimension=3)
+    plain, asked = (
+        json.loads(granufab("measure", run, "--json", "--frame", -1, *options).out)[0]
+        for options in ((), ("--with-forces",))
+    )
+    assert plain["dimension"] == 3
+    g_1, g_2, g_3 = (plain[f"g_{k}"] for k in (1, 2, 3))
+    assert plain["b_g"] == pytest.approx((g_2 - g_3) / (g_1 - g_3))
+    assert not {"a_n", "sliding_fraction"} & set(plain)
+    assert {name: asked[name] for name in plain} == plain
+    assert asked["a_t"] == pytest.approx(0.0, abs=1e-12)
+    assert asked["sliding_fraction"] == 0.0
+    assert asked["mean_mobilisation"] == pytest.approx(0.0, abs=1e-12)
+    assert asked["strong_share"] == pytest.approx(np.exp(-1), abs=0.06)
+    table = granufab("measure", run, "--with-forces").out
+    assert "b_G" in table and "sliding" in table
+
+
+def test_a_criterion_without_forces_says_so(granufab, run_file: Path) -> None:
+    done = granufab("measure", run_file, "--json", "--with-forces", "--criterion", "gap:0.5")
+    assert done.code == 0
+    assert json.loads(done.out)[0]["a_n"] is None
+    assert "contact forces" in done.err
 
 
 @pytest.mark.parametrize("frame", [1, -2])

@@ -11,7 +11,7 @@ import typer
 
 from granufab.cli.choices import Definition
 from granufab.cli.output_files import check_table
-from granufab.errors import InvalidSettings
+from granufab.errors import InvalidSettings, MissingData
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,18 +21,24 @@ if TYPE_CHECKING:
 __all__ = ["measure"]
 
 COUNTS = ("contact_count", "grain_count", "dimension", "stage")
-SHOWN = (
-    "frame",
-    "eps_q",
-    "z",
-    "z_backbone",
-    "rattler_fraction",
-    "a",
-    "a_signed",
-    "q_over_p",
-    "phi",
-)
-HEADER = ("frame", "ε_q", "z", "z_backbone", "rattlers", "a", "a'", "q/p", "φ")
+SHOWN = {
+    "frame": "frame",
+    "eps_q": "ε_q",
+    "z": "z",
+    "z_backbone": "z_backbone",
+    "rattler_fraction": "rattlers",
+    "a": "a",
+    "a_signed": "a'",
+    "b_g": "b_G",
+    "q_over_p": "q/p",
+    "phi": "φ",
+    "a_n": "a_n",
+    "a_t": "a_t",
+    "a_l": "a_ℓ",
+    "q_over_p_full": "q/p full",
+    "sliding_fraction": "sliding",
+}
+"""Columns of the table for people, where a file has them."""
 
 
 def measure(
@@ -46,6 +52,10 @@ def measure(
     frame: Annotated[
         int | None, typer.Option(metavar="K", help="One state only; negative from the end.")
     ] = None,
+    forces: Annotated[
+        bool,
+        typer.Option("--with-forces", help="Add force anisotropies, sliding, strong contacts."),
+    ] = False,
     json: Annotated[bool, typer.Option("--json", help="A JSON list on standard output.")] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE.csv|.nc", help="Also write all values here.")
@@ -56,18 +66,22 @@ def measure(
     from granufab.cli.output import print_json, print_rows
 
     check_table(out, force)
-    tables = [_measure_file(file, criterion, z_definition, frame) for file in files]
+    tables = [_measure_file(file, criterion, z_definition, frame, forces) for file in files]
     if out is not None:
         _write(tables, out)
     if json:
         print_json([state for table in tables for state in _states(table)])
         return
     for file, table in zip(files, tables, strict=True):
-        rows = [[state[name] for name in SHOWN] for state in _states(table)]
-        print_rows(f"{file}; contacts: {criterion}; fabric of: {z_definition}", HEADER, rows)
+        names = [name for name in SHOWN if name in table.variables]
+        rows = [[state[name] for name in names] for state in _states(table)]
+        title = f"{file}; contacts: {criterion}; fabric of: {z_definition}"
+        print_rows(title, [SHOWN[name] for name in names], rows)
 
 
-def _measure_file(file: Path, criterion: str, z_definition: Any, frame: int | None) -> xr.Dataset:
+def _measure_file(
+    file: Path, criterion: str, z_definition: Any, frame: int | None, forces: bool
+) -> xr.Dataset:
     """One row per state, with its source and number."""
     from dataclasses import replace
 
@@ -81,7 +95,7 @@ def _measure_file(file: Path, criterion: str, z_definition: Any, frame: int | No
             raise InvalidSettings(f"--frame {frame}: {file} holds frames 0..{len(numbers) - 1}")
         numbers = [numbers[frame]]
         run = replace(run, frames=[run.frames[frame]])
-    table = measure_run(run, criterion=criterion, z_definition=z_definition)
+    table = measure_run(run, criterion=criterion, z_definition=z_definition, forces=forces)
     _explain_unknown(file, run, table)
     table = table.assign(source=("frame", [str(file)] * len(numbers)))
     return table.assign_coords(frame=numbers)
@@ -101,6 +115,7 @@ def _explain_unknown(file: Path, run: Run, table: xr.Dataset) -> None:
     """Say once, on standard error, why some columns are unknown throughout."""
     if not any(bool(table[name].isnull().all()) for name in table.data_vars):
         return
+    from granufab.fabric import force_values
     from granufab.fabric import measure as measure_state
 
     first = run.frames[0]
@@ -110,8 +125,15 @@ def _explain_unknown(file: Path, run: Run, table: xr.Dataset) -> None:
         z_definition=table.attrs["z_definition"],
         direction=first.direction,
     )
-    if state["missing"]:
-        print(f"granufab: {file}: some values are unknown: {state['missing']}", file=sys.stderr)
+    reasons = [str(state["missing"])] if state["missing"] else []
+    if "a_n" in table and bool(table["a_n"].isnull().all()):
+        try:
+            force_values(first, criterion=table.attrs["criterion"])
+        except MissingData as error:
+            reasons.append(str(error))
+    if reasons:
+        why = "; ".join(dict.fromkeys(reasons))
+        print(f"granufab: {file}: some values are unknown: {why}", file=sys.stderr)
 
 
 def _write(tables: list[xr.Dataset], out: Path) -> None:

@@ -16,6 +16,7 @@ from granufab.fabric.criterion_curves import criterion_curves, criterion_sweep
 from granufab.fabric.displacements import mean_motion, nonaffine_displacement
 from granufab.fabric.ensemble import late_frames
 from granufab.fabric.fluctuations import fluctuations
+from granufab.fabric.force_values import force_values
 from granufab.fabric.forces import force_statistics
 from granufab.fabric.harmonics import real_harmonics, sphere_density, sphere_orientation
 from granufab.fabric.homogeneity import homogeneity, local_strain
@@ -72,6 +73,7 @@ __all__ = [
     "fluctuation_spectrum",
     "fluctuations",
     "force_statistics",
+    "force_values",
     "fourth_order_tensor",
     "homogeneity",
     "intermediate_ratio",

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -24,10 +23,10 @@ from granufab.fabric.contact_identity import (
     follow_contacts,
 )
 from granufab.fabric.coordination import ZDefinition, check_definition
-from granufab.fabric.criterion import Criterion, parse_criterion
+from granufab.fabric.criterion import Criterion
 from granufab.fabric.direction_bins import DirectionBins
 from granufab.fabric.lattice import lattice_change
-from granufab.fabric.run_definitions import recorded_reach
+from granufab.fabric.run_definitions import recorded_reach, run_definitions
 from granufab.history import Run
 from granufab.packing import Array, IntArray, Packing
 
@@ -166,7 +165,7 @@ def follow_run(
     if len(run.frames) == 0:
         raise MissingData(f"run {run.name!r} has no recorded frames")
     rule = ContactRule(
-        criterion=parse_criterion(criterion or _section(run, "record").get("criterion", "force")),
+        criterion=run_definitions(run, criterion)[0],
         keep=keep,
         z_definition=check_definition(z_definition),
         minimum=minimum,
@@ -271,8 +270,3 @@ def count_error(count: Array | IntArray) -> Array:
 
 def _error_of(text: Mapping[str, str]) -> dict[str, str]:
     return {"units": text["units"], "long_name": "standard error of " + text["long_name"]}
-
-
-def _section(run: Run, name: str) -> Mapping[str, Any]:
-    section = run.settings.get(name, {})
-    return section if isinstance(section, Mapping) else {}

@@ -18,9 +18,10 @@ from granufab.fabric.coordination import (
     counted_contacts,
 )
 from granufab.fabric.criterion import Criterion, force_threshold, mean_diameter, parse_criterion
+from granufab.fabric.force_values import FORCE_VALUES, force_values
 from granufab.fabric.neighbours import branch_vectors, neighbours_within
 from granufab.fabric.network import Network, select_network
-from granufab.fabric.run_definitions import recorded_reach, run_definitions
+from granufab.fabric.run_definitions import recorded_reach, run_definitions, run_friction
 from granufab.fabric.stress import solid_fraction, stress_ratio, stress_tensor
 from granufab.fabric.tensors import (
     anisotropy,
@@ -43,19 +44,23 @@ __all__ = ["measure", "measure_run", "quick_measure", "values_dataset"]
 
 Value = float | str | None
 
-_UNITS: dict[str, tuple[str, str]] = SERIES_UNITS | {
-    "a_noise": ("-", "standard error of a' if contacts were independent"),
-    "a_bias": ("-", "mean unsigned a of an isotropic state, contacts independent"),
-    "p_g": ("-", "mean part p_G of the enriched fabric tensor"),
-    "q_g": ("-", "deviatoric part q_G of the enriched fabric tensor"),
-    "b_g": ("-", "intermediate ratio b_G of the enriched fabric tensor"),
-    "contact_count": ("-", "contacts under the criterion"),
-    "grain_count": ("-", "grains"),
-    "overlap": ("mean diameter", "worst overlap of the state"),
-    "stage": ("-", "stage of the path"),
-    "z_error": ("-", "bootstrap standard error of the z in use"),
-    "a_signed_error": ("-", "bootstrap standard error of a'"),
-}
+_UNITS: dict[str, tuple[str, str]] = (
+    SERIES_UNITS
+    | {
+        "a_noise": ("-", "standard error of a' if contacts were independent"),
+        "a_bias": ("-", "mean unsigned a of an isotropic state, contacts independent"),
+        "p_g": ("-", "mean part p_G of the enriched fabric tensor"),
+        "q_g": ("-", "deviatoric part q_G of the enriched fabric tensor"),
+        "b_g": ("-", "intermediate ratio b_G of the enriched fabric tensor"),
+        "contact_count": ("-", "contacts under the criterion"),
+        "grain_count": ("-", "grains"),
+        "overlap": ("mean diameter", "worst overlap of the state"),
+        "stage": ("-", "stage of the path"),
+        "z_error": ("-", "bootstrap standard error of the z in use"),
+        "a_signed_error": ("-", "bootstrap standard error of a'"),
+    }
+    | FORCE_VALUES
+)
 _AXES = "xyz"
 
 
@@ -137,6 +142,7 @@ def measure_run(
     direction: Array | None = None,
     minimum: int | None = None,
     bootstrap: int = 0,
+    forces: bool = False,
 ) -> xr.Dataset:
     """All values of :func:`measure` for every recorded frame of a run.
 
@@ -148,6 +154,7 @@ def measure_run(
         minimum: fewest contacts that hold a grain; default the run's own rule, D + 1 where its
             grains have no friction, else 2.
         bootstrap: number of resampled states a frame for standard errors.
+        forces: add the values of :func:`~granufab.fabric.force_values`, with the run's friction.
     Returns:
         Variables over ``frame``, NaN where unknown, with eps_q, eps_q_total, stage, residual,
         sweeps and inertial_number of the frame; units, long_name and the definitions in attrs.
@@ -171,6 +178,8 @@ def measure_run(
             reach=recorded_reach(run),
             bootstrap=bootstrap,
         )
+        if forces:
+            row |= _force_row(frame, run, rule, definition, fewest, direction)
         rows.append(row | _frame_values(frame))
     attributes = {
         "path": run.name,
@@ -336,6 +345,30 @@ def _frame_values(frame: Frame) -> dict[str, float]:
         "sweeps": frame.statistics.sweeps,
         "inertial_number": frame.inertial_number,
     }
+
+
+def _force_row(
+    frame: Frame,
+    run: Run,
+    rule: Criterion,
+    definition: ZDefinition,
+    fewest: int,
+    direction: Array | None,
+) -> dict[str, Value]:
+    """Values of the forces; None throughout where the frame does not tell."""
+    try:
+        return dict(
+            force_values(
+                frame,
+                friction=run_friction(run),
+                criterion=rule,
+                z_definition=definition,
+                minimum=fewest,
+                axis=direction,
+            )
+        )
+    except MissingData:
+        return dict.fromkeys(FORCE_VALUES)
 
 
 def _check_direction(direction: Array | None, dimension: int) -> Array | None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 from granufab.fabric.coordination import ZDefinition, check_definition
 from granufab.fabric.criterion import Criterion, parse_criterion
 from granufab.fabric.rattlers import minimum_contacts
 from granufab.history import Run
 
-__all__ = ["recorded_reach", "run_definitions"]
+__all__ = ["recorded_reach", "run_definitions", "run_friction"]
 
 
 def run_definitions(
@@ -26,20 +27,29 @@ def run_definitions(
     Raises:
         InvalidSettings: an unknown criterion or definition.
     """
-    record, material = (run.settings.get(name, {}) for name in ("record", "material"))
-    record = record if isinstance(record, Mapping) else {}
+    record = _section(run, "record")
     rule = parse_criterion(criterion or record.get("criterion", "force"))
     definition = check_definition(z_definition or record.get("z_definition", "z_backbone"))
     if minimum is None:
-        smooth = isinstance(material, Mapping) and material.get("friction") == 0
+        smooth = run_friction(run) == 0
         minimum = minimum_contacts("frictionless" if smooth else "frictional", run.dimension)
     return rule, definition, minimum
 
 
 def recorded_reach(run: Run) -> float | None:
     """Gap up to which a run lists every pair [mean diameters]: no more than its search margin."""
-    sections = (run.settings.get(name, {}) for name in ("record", "solver"))
-    record, solver = (s if isinstance(s, Mapping) else {} for s in sections)
+    record, solver = _section(run, "record"), _section(run, "solver")
     if record.get("reach") is None:
         return None
     return min(float(record["reach"]), float(solver.get("skin", math.inf)))
+
+
+def run_friction(run: Run) -> float | None:
+    """Friction coefficient µ between the grains of a run [-], or None where it does not tell."""
+    value = _section(run, "material").get("friction")
+    return None if value is None else float(value)
+
+
+def _section(run: Run, name: str) -> Mapping[str, Any]:
+    section = run.settings.get(name, {})
+    return section if isinstance(section, Mapping) else {}

@@ -22,13 +22,13 @@ from granufab.states.evolution_path import predict_evolution
 from granufab.states.limits import check_limits, critical_limits
 from granufab.states.series import as_series, load_paths, same_length
 
-__all__ = ["StrainData", "StrainPath", "load_strain_paths"]
+__all__ = ["RecordedPath", "StrainData", "load_strain_paths"]
 
 _AXIS = 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class StrainPath:
+class RecordedPath:
     """One recorded path.
 
     Attributes:
@@ -63,7 +63,7 @@ class StrainData:
         limit_draws: resampled limits, shape (samples, 2).
     """
 
-    paths: tuple[StrainPath, ...]
+    paths: tuple[RecordedPath, ...]
     dimension: int
     scatter: tuple[float, float]
     limits: Array
@@ -92,7 +92,7 @@ def load_strain_paths(
         stages = [_stage(strain[low : high + 1], dimension, b) for low, high in pairwise(edges)]
         first = slice(edges[1] + 1)
         signs.add(_sense(strain[first], a_[first], number))
-        paths.append(StrainPath(z=z_, a=a_, stages=tuple(stages)))
+        paths.append(RecordedPath(z=z_, a=a_, stages=tuple(stages)))
         cut.append((strain[first], z_[first], a_[first]))
     if dimension == 3 and b is None and len(signs) > 1:
         raise InvalidSettings("some paths start in compression, others in extension; fit one kind")
@@ -100,7 +100,7 @@ def load_strain_paths(
 
 
 def _with_limits(
-    paths: tuple[StrainPath, ...],
+    paths: tuple[RecordedPath, ...],
     cut: list[tuple[Array, Array, Array]],
     dimension: int,
     b: float | None,
