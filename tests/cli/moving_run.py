@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from granufab.fabric import neighbours_within
-from granufab.history import Frame
+from granufab.history import SERIES_UNITS, Frame
 from granufab.packing import Cell, Grains, Packing
 
 
-def moving_run(path: Path, dimension: int = 2) -> Path:
+def moving_run(path: Path, dimension: int = 2, frames: int = 12) -> Path:
     """Grains on a jittered lattice in an affine flow, every pair in reach a contact."""
     from granufab.io import RunFileWriter
     from granufab.simulate.settings import Case, Sample
@@ -25,7 +25,7 @@ def moving_run(path: Path, dimension: int = 2) -> Path:
     )
     settings = Case(sample=Sample(dimension=dimension)).model_dump(mode="json")
     with RunFileWriter(path, settings=settings) as writer:
-        for index in range(12):
+        for index in range(frames):
             strain = 0.01 * index
             gradient = np.eye(dimension)
             gradient[0, 0], gradient[1, 1] = 1 + strain / 2, 1 - strain / 2
@@ -50,4 +50,6 @@ def moving_run(path: Path, dimension: int = 2) -> Path:
                     direction=np.eye(dimension)[1],
                 )
             )
+            row: dict[str, float | str] = dict.fromkeys(SERIES_UNITS, 0.0)
+            writer.row(row | {"path": "made-up", "eps_q": strain, "eps_q_total": strain})
     return path
