@@ -8,6 +8,7 @@ the strong and the weak network.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 
 import numpy as np
@@ -217,10 +218,16 @@ def _with_errors(
     for name, text in texts.items():
         value = values[name][0]
         dims = ("part",) if np.ndim(value) else ()
-        error = np.nanstd(drawn[name], axis=0) if replicas else np.full_like(value, np.nan)
+        error = _spread(drawn[name]) if replicas else np.full_like(value, np.nan)
         data[name] = (dims, value, describe(text))
         data[f"{name}_error"] = (dims, error, describe(f"bootstrap standard error of {name}"))
     return data
+
+
+def _spread(drawn: Array) -> Array:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a value that no draw can tell
+        return np.nanstd(drawn, axis=0)
 
 
 def _power_exponent(mean: float, depth: float) -> float:
