@@ -153,7 +153,7 @@ def main() -> None:
     parser.add_argument("--friction", type=float, default=0.4)
     parser.add_argument("--strain", type=float, default=0.4)
     parser.add_argument("--inertial-number", type=float, default=1e-3)
-    parser.add_argument("--time-step", type=float, default=0.1)
+    parser.add_argument("--time-step", type=float, default=0.05)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=2)
     given = parser.parse_args()

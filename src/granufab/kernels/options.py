@@ -23,26 +23,25 @@ ARITHMETIC: dict[str, Any] = {"fastmath": {"contract", "nsz", "nnan"}, "error_mo
 
 
 def cache_folder() -> str:
-    """Where compiled kernels lie: NUMBA_CACHE_DIR, or a user cache folder of this version.
+    """Where compiled kernels lie: in NUMBA_CACHE_DIR or a user cache folder.
 
     The folder's name holds a hash of the kernels' text.
 
     Numba notices a change only in the file that holds a function, not in those it inlines, so
     a new version of the package must never meet kernels compiled from an older one.
     """
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        return os.environ["NUMBA_CACHE_DIR"]
     home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
     base = Path(home) if home else Path.home() / ".cache"
+    base = Path(os.environ.get("NUMBA_CACHE_DIR") or base / "granufab")
     text = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*.py")):
         text.update(path.read_bytes())
     name = f"kernels-{text.hexdigest()[:16]}"
     try:
-        (base / "granufab" / name).mkdir(parents=True, exist_ok=True)
+        (base / name).mkdir(parents=True, exist_ok=True)
     except OSError:  # no home to write in: the kernels are then compiled once per machine start
         return str(Path(tempfile.gettempdir()) / "granufab" / name)
-    return str(base / "granufab" / name)
+    return str(base / name)
 
 
 config.CACHE_DIR = cache_folder()  # type: ignore[attr-defined]

@@ -14,7 +14,7 @@ from granufab.errors import MissingData
 from granufab.fabric import average_balance
 from granufab.packing import Array
 from granufab.plots.curves import LABELS, running_mean
-from granufab.plots.style import COLOURS, COLUMN, INK, new_figure, style
+from granufab.plots.style import COLOURS, COLUMN, INK, POINTS, new_figure, style
 
 __all__ = ["attribution", "balance", "sampling_rates"]
 
@@ -131,8 +131,7 @@ def _draw_current(ax: Axes, mean: xr.Dataset, edges: Array) -> None:
 def _points(
     ax: Axes, x: Array, y: Array, error: Array, *, label: str, marker: str, colour: str
 ) -> ErrorbarContainer:
-    look = {"fmt": marker, "ms": 3.2, "mfc": "white", "mew": 0.8, "elinewidth": 0.7}
-    return ax.errorbar(x, y, yerr=error, color=colour, label=label, zorder=3, **look)
+    return ax.errorbar(x, y, yerr=error, fmt=marker, color=colour, label=label, zorder=3, **POINTS)
 
 
 def attribution(data: xr.Dataset, *, smooth: float = 0.05) -> list[Axes]:

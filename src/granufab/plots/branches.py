@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from granufab.plots.style import COLOURS, letter_panels, new_figure, style
+from granufab.plots.style import COLOURS, POINTS, letter_panels, new_figure, style
 
 __all__ = ["branches", "branches_joint", "direction_axis"]
 
@@ -44,10 +44,7 @@ def branches(data: xr.Dataset, *, ax: Sequence[Axes] | None = None) -> list[Axes
             data["mean_length"] / mean,
             yerr=data["mean_length_error"] / mean,
             fmt="o",
-            ms=3,
-            mfc="white",
-            mew=0.8,
-            elinewidth=0.7,
+            **POINTS,
             color=COLOURS[0],
         )
         panels[1].plot(theta, data["mean_length_fit"] / mean, color=COLOURS[0])

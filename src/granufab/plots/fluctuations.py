@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import NullFormatter, NullLocator
 
 from granufab.packing import Array
-from granufab.plots.style import COLOURS, FIT, INK, letter_panels, new_figure, style
+from granufab.plots.style import COLOURS, FIT, INK, POINTS, letter_panels, new_figure, style
 
 __all__ = [
     "fluctuation_growth",
@@ -110,10 +110,8 @@ def fluctuation_kurtosis(data: xr.Dataset, *, ax: Axes | None = None) -> Axes:
                 for name in ("kurtosis", "kurtosis_error")
             )
             shifted = place * 1.08 ** (index - 0.5)
-            style_ = {"ms": 3.2, "mfc": "white", "elinewidth": 0.7, "color": COLOURS[index]}
-            ax.errorbar(
-                shifted, value, yerr=error, fmt=MARKERS[index], label=f"${component}$", **style_
-            )
+            ax.errorbar(shifted, value, yerr=error, fmt=MARKERS[index], **POINTS,
+                        color=COLOURS[index], label=f"${component}$")  # fmt: skip
         ax.set_xscale("log")
         if not moved.all():
             ax.axvline(0.6 * strain[0], color=FIT, lw=0.6, ls=":")
@@ -153,8 +151,8 @@ def fluctuation_growth(
             )
             exponent, spread = float(result["exponent"]), float(result["exponent_error"])
             law = rf"$\alpha = {exponent:.2f} \pm {spread:.2f}$"
-            ax.errorbar(strain, value, yerr=error, fmt=MARKERS[index], ms=3.2, mfc="white",
-                        elinewidth=0.7, color=COLOURS[index], label=label or None)  # fmt: skip
+            ax.errorbar(strain, value, yerr=error, fmt=MARKERS[index], **POINTS,
+                        color=COLOURS[index], label=label or None)  # fmt: skip
             middle = np.exp(np.mean(np.log(value)) - exponent * np.mean(np.log(strain)))
             ax.plot(strain, middle * strain**exponent, color=COLOURS[index], lw=0.9, label=law)
         ax.set_xscale("log")
@@ -185,8 +183,8 @@ def fluctuation_spectrum(
         for index, (label, data) in enumerate(several.items()):
             wave, power, error = (data[name].to_numpy() for name in ("k", "S", "S_error"))
             error = np.minimum(error, 0.9 * power)
-            ax.errorbar(wave, power, yerr=error, fmt=MARKERS[index], ms=3.2, mfc="white",
-                        elinewidth=0.7, color=COLOURS[index], label=label or None)  # fmt: skip
+            ax.errorbar(wave, power, yerr=error, fmt=MARKERS[index], **POINTS,
+                        color=COLOURS[index], label=label or None)  # fmt: skip
             _draw_law(ax, data, COLOURS[index])
         ax.axhline(1.0, color=FIT, lw=0.7, ls=":")
         ax.set_xscale("log")

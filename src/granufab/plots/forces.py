@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from granufab.errors import MissingData
-from granufab.plots.style import COLOURS, FIT, INK, new_figure, style
+from granufab.plots.style import COLOURS, FIT, INK, POINTS, new_figure, style
 
 __all__ = ["force_density", "mobilisation"]
 
@@ -98,10 +98,7 @@ def _points(
         density[shown],
         yerr=np.minimum(data["P_force_error"].to_numpy()[shown], 0.9 * density[shown]),
         fmt=marker,
-        ms=3,
-        mfc="white",
-        mew=0.8,
-        elinewidth=0.7,
+        **POINTS,
         color=colour,
         label=label or None,
     )

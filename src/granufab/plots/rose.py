@@ -12,7 +12,7 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.typing import ColorType
 
 from granufab.errors import MissingData
-from granufab.plots.style import new_figure, style
+from granufab.plots.style import POINTS, new_figure, style
 
 __all__ = ["rose"]
 
@@ -68,11 +68,8 @@ def _draw(ax: Axes, data: xr.Dataset, label: str, marker: str, colour: ColorType
         value,
         yerr=error,
         fmt=marker,
-        ms=3,
-        mfc="white",
-        mew=0.8,
+        **POINTS,
         color=colour,
-        elinewidth=0.7,
         label=label or None,
         zorder=3,
     )

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from granufab.plots.branches import direction_axis
-from granufab.plots.style import COLOURS, FIT, INK, letter_panels, new_figure, style
+from granufab.plots.style import COLOURS, FIT, INK, POINTS, letter_panels, new_figure, style
 
 __all__ = ["stress_force_fabric", "stress_ratios"]
 
@@ -49,10 +49,7 @@ def stress_force_fabric(data: xr.Dataset, *, ax: Sequence[Axes] | None = None) -
                 data[name] / scale,
                 yerr=data[f"{name}_error"] / scale,
                 fmt=marker,
-                ms=3,
-                mfc="white",
-                mew=0.8,
-                elinewidth=0.7,
+                **POINTS,
                 color=COLOURS[index],
                 label=label,
             )
@@ -105,10 +102,7 @@ def stress_ratios(states: Mapping[str, xr.Dataset], *, ax: Axes | None = None) -
                 xerr=error,
                 yerr=spread,
                 fmt=marker,
-                ms=3.5,
-                mfc="white",
-                mew=0.8,
-                elinewidth=0.6,
+                **POINTS,
                 color=COLOURS[index],
                 label=label,
             )

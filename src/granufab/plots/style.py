@@ -19,7 +19,17 @@ from matplotlib.figure import Figure
 
 from granufab.errors import GranufabError
 
-__all__ = ["COLOURS", "COLUMN", "FIT", "INK", "letter_panels", "new_figure", "save", "style"]
+__all__ = [
+    "COLOURS",
+    "COLUMN",
+    "FIT",
+    "INK",
+    "POINTS",
+    "letter_panels",
+    "new_figure",
+    "save",
+    "style",
+]
 
 COLUMN = 84 / 25.4
 """Width of a journal column [inch]."""
@@ -32,6 +42,9 @@ INK = "#222222"
 
 FIT = "#777777"
 """Accessible domain and its uncertainty."""
+
+POINTS: dict[str, Any] = {"ms": 3, "mfc": "white", "mew": 0.8, "elinewidth": 0.7}
+"""Look of measured points with error bars."""
 
 _RC: dict[Any, Any] = {
     "font.family": ["STIXGeneral", "DejaVu Serif"],

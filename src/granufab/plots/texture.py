@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from granufab.plots.branches import direction_axis
-from granufab.plots.style import COLOURS, FIT, INK, new_figure, style
+from granufab.plots.style import COLOURS, FIT, INK, POINTS, new_figure, style
 from granufab.states import window_occupation
 
 __all__ = ["occupation", "texture"]
@@ -76,10 +76,7 @@ def occupation(data: xr.Dataset, *, ax: Axes | None = None) -> Axes:
             data["occupation"],
             yerr=data["occupation_error"],
             fmt="o",
-            ms=3,
-            mfc="white",
-            mew=0.8,
-            elinewidth=0.7,
+            **POINTS,
             label="counted",
         )
         ax.plot(np.degrees(theta), fit, color=COLOURS[0], label="second-order $E$")

@@ -1,14 +1,14 @@
 """Isotropic samples: compaction under p, relaxation to rest, and a wanted coordination number.
 
 Compaction: free dilation, rigid contacts, the solved rate capped so that grains cannot tunnel.
-Settling: damping until the kinetic energy is gone (without friction by stopping all motion
-whenever that energy passes a maximum). Rest: a tight tolerance and the correction of
-overlaps, so that contact counts mean something (a spurious impulse of the solver's noise would
-count as a contact). A wanted z_0 is reached by changing the friction of the compaction.
+Then the motion settles and the forces at rest are found so sharply that contact counts mean
+something (a spurious impulse of the solver's noise would count as a contact). A wanted z_0 is
+reached by changing the friction of the compaction.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,17 +21,15 @@ from granufab.simulate.capture import capture_packing, measure_now
 from granufab.simulate.loading import Isotropic
 from granufab.simulate.sample import random_sample
 from granufab.simulate.settings import Material, Sample, Solver
+from granufab.simulate.settling import march, settle
 from granufab.simulate.stepping import Simulation
 
 __all__ = ["Prepared", "compress", "prepare", "rest_values"]
 
 Progress = Callable[[str, float], None]
 RATE_CAP = 0.05
-STIFFNESS = 1.6e5
-COMPACT_STEPS, SETTLE_STEPS, REST_STEPS = 6000, 600, 80
-COMPACTED_ENERGY, RESTING_ENERGY, ALLOWED_ENERGY = 1e-4, 1e-10, 1e-6
-SETTLED_ENERGY = 1e-8
-RESTING_OVERLAP = 2e-6
+COMPACT_STEPS = 6000
+COMPACTED_ENERGY, ALLOWED_ENERGY = 1e-4, 1e-6
 FRICTION_HIGH = 5.0
 TRIALS = 12
 # z_backbone against compaction friction of samples made by this very protocol (2,000 disks,
@@ -53,7 +51,8 @@ class Prepared:
         reached: z, z_backbone, z_mechanical, rattler_fraction, phi, a at rest.
         wanted: the coordination number asked for, or None.
         trials: (friction, z) of every compaction tried.
-        summary: residual, overlap, kinetic ratio, steps, seconds of the last compaction.
+        summary: residual, overlap, kinetic ratio, steps, seconds of the last compaction; ``rest``
+            is "programs" where linear programs found it, with their number and ``gaps_closed``.
     """
 
     packing: Packing
@@ -85,7 +84,8 @@ def compress(
         packing: grains with masses in a cell, periodic or walled.
         friction: µ_c during compaction; it decides z: 0 gives the isostatic z_backbone = 2D.
         pressure: p [N/m^(D−1)].
-        tolerance: residual of the final steps; default 1e-6, without friction 3e-7.
+        tolerance: residual at rest; default 1e-6 (3e-7 in frictionless samples too large for
+            the linear programs of their rest).
         diagonals: let all diagonal components of the cell move (n_free = D), not only the
             dilation (n_free = 1).
         progress: called with a text and the fraction done.
@@ -116,6 +116,7 @@ def _compact(
 ) -> tuple[Simulation, dict[str, Any]]:
     if not (np.isfinite(friction) and friction >= 0):
         raise InvalidSettings(f"compaction friction is {friction}, must be ≥ 0")
+    began = time.perf_counter()
     tell = progress or (lambda text, fraction: None)
     fast = Solver(tolerance=1e-3, stiffness=float("inf"), time_step=0.1, max_sweeps=3000)
     simulation = Simulation(
@@ -125,23 +126,10 @@ def _compact(
         solver=fast,
     )
     simulation.rate_cap = RATE_CAP / simulation.scales.time
-    steps = _march(simulation, COMPACT_STEPS, 50, _compacted, lambda f: tell("compacting", 0.4 * f))
+    steps = march(simulation, COMPACT_STEPS, 50, _compacted, lambda f: tell("compacting", 0.4 * f))
     simulation.rate_cap = None
-    settle, rest = _relaxation(friction, tolerance)
-    _use(simulation, settle)
-    quench = _KineticDamping() if friction == 0 else None
-    simulation.damping = 0.5 if quench is None else 0.0
-    steps += _march(
-        simulation,
-        SETTLE_STEPS,
-        10,
-        lambda s: (quench.peak if quench else s.kinetic_ratio()) < SETTLED_ENERGY,
-        lambda f: tell("settling", 0.4 + 0.4 * f),
-        quench,
-    )
-    simulation.damping = 0.5
-    _use(simulation, rest)
-    steps += _march(simulation, REST_STEPS, 5, _resting, lambda f: tell("resting", 0.8 + 0.2 * f))
+    more, how = settle(simulation, friction, tolerance, lambda f: tell("settling", 0.4 + 0.6 * f))
+    steps += more
     report = simulation.last_report
     if simulation.kinetic_ratio() > ALLOWED_ENERGY:
         raise NotConverged(
@@ -154,80 +142,15 @@ def _compact(
         "overlap": report.overlap,
         "kinetic_ratio": simulation.kinetic_ratio(),
         "contact_updates": simulation.contact_updates,
-        "seconds": sum(simulation.seconds.values()),
+        "seconds": time.perf_counter() - began,
+        **how,
     }
-
-
-def _use(simulation: Simulation, solver: Solver) -> None:
-    simulation.solver = solver
-    simulation.set_loading(simulation.loading)
-
-
-def _march(
-    simulation: Simulation,
-    limit: int,
-    every: int,
-    done: Callable[[Simulation], bool],
-    tell: Callable[[float], None],
-    after_step: Callable[[Simulation], None] | None = None,
-) -> int:
-    for k in range(1, limit + 1):
-        simulation.step()
-        if after_step is not None:
-            after_step(simulation)
-        if k % every == 0:
-            tell(k / limit)
-            if done(simulation):
-                return k
-    return limit
-
-
-class _KineticDamping:
-    """Stops every motion where the kinetic energy has passed a maximum.
-
-    Without friction a packing is barely stiff: viscous damping takes thousands of steps, while
-    the energy that a soft mode has turned into motion can be taken out at once.
-    """
-
-    def __init__(self) -> None:
-        self.energy, self.peak = 0.0, float("inf")
-
-    def __call__(self, simulation: Simulation) -> None:
-        energy = simulation.kinetic_ratio()
-        if energy >= self.energy:
-            self.energy = energy
-            return
-        self.energy, self.peak = 0.0, self.energy
-        simulation.motion[:, : simulation.dimension + simulation.candidates.tangents] = 0.0
-        simulation.rate[:] = 0.0
 
 
 def _compacted(simulation: Simulation) -> bool:
     pressure = float(np.trace(simulation.stress)) / simulation.dimension
     close = abs(pressure / simulation.scales.pressure - 1) < 1e-2
     return close and simulation.kinetic_ratio() < COMPACTED_ENERGY
-
-
-def _relaxation(friction: float, tolerance: float | None) -> tuple[Solver, Solver]:
-    """Solvers for settling and for rest.
-
-    With friction both are slightly compliant, which converges at rest; without friction the
-    rest is rigid and overlaps are removed, so that the packing ends isostatic.
-    """
-    gentle = Solver(tolerance=1e-5, stiffness=STIFFNESS, time_step=0.5, max_sweeps=3000)
-    if friction > 0:
-        return gentle, gentle.model_copy(update={"tolerance": tolerance or 1e-6})
-    rigid = {"stiffness": float("inf"), "overlap_correction": 0.1, "max_sweeps": 5000}
-    return (
-        gentle.model_copy(update={"time_step": 0.2}),
-        gentle.model_copy(update={"tolerance": tolerance or 3e-7, **rigid}),
-    )
-
-
-def _resting(simulation: Simulation) -> bool:
-    report = simulation.last_report
-    still = simulation.kinetic_ratio() < RESTING_ENERGY and report.converged
-    return still and (report.overlap < RESTING_OVERLAP or np.isfinite(simulation.solver.stiffness))
 
 
 def prepare(sample: Sample, *, progress: Progress | None = None) -> Prepared:

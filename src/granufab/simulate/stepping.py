@@ -118,8 +118,8 @@ class Simulation:
         self.searches = 0
         self.seconds = {"search": 0.0, "geometry": 0.0, "solve": 0.0, "rest": 0.0}
         self.set_loading(loading, step=step)
-        self._search()
-        self._measure_gaps()
+        self.search()
+        self.measure_gaps()
         self.candidates.seed_impulses(
             packing.contacts, packing.wall_contacts, self.step_size, self.remap
         )
@@ -175,6 +175,11 @@ class Simulation:
             velocity = self.motion[: self.grain_count, : self.dimension]
             velocity -= (self.mass @ velocity) / self.mass.sum()
 
+    def stop(self) -> None:
+        """End every motion: of the grains, their spins, and the cell."""
+        self.motion[:, : self.dimension + self.candidates.tangents] = 0.0
+        self.rate = np.zeros_like(self.rate)
+
     def step(self) -> StepReport:
         """Advance by ``step_size``.
 
@@ -186,9 +191,9 @@ class Simulation:
         rate_before = self.rate.copy()
         self._half_drift()
         if self._needs_search():
-            self._search()
+            self.search()
         clock = self._tick("search", clock)
-        self._measure_gaps()
+        self.measure_gaps()
         self._select()
         self._free_velocities(rate_before)
         clock = self._tick("geometry", clock)
@@ -226,37 +231,28 @@ class Simulation:
     def _margin(self) -> float:
         return ACTIVE_MARGIN * self.scales.diameter
 
-    def _search(self) -> None:
+    def search(self) -> None:
+        """Find the candidate pairs afresh; gaps are measured separately."""
         shorten_cell(self.matrix, self.periodic, self.remap, self.candidates.shear_images)
-        self.candidates.search(
-            self.position,
-            self.radius,
-            (self.matrix, self.origin, self.periodic),
-            self._skin,
-            (self.material.friction, self.material.wall_friction),
-        )
+        cell = (self.matrix, self.origin, self.periodic)
+        friction = (self.material.friction, self.material.wall_friction)
+        self.candidates.search(self.position, self.radius, cell, self._skin, friction)
         self.walked[:] = 0.0
         self.strain_walked = 0.0
         self._farthest = 0.0
         self.searches += 1
         self._buffers = Buffers.of(self.candidates.count, self.dimension)
 
-    def _measure_gaps(self) -> None:
+    def measure_gaps(self) -> None:
+        """Normals, lengths and gaps of the candidates at the present positions."""
         self.candidates.measure(self.position, self.radius, self.matrix, self.origin, self.like)
 
     def _select(self) -> None:
         touching = 1e-10 * self.scales.diameter
         margin = -1.0 if self.material.restitution > 0 else self._margin
         limits = (margin, self.step_size, float(np.linalg.norm(self.rate)), touching)
-        select_active(
-            self.candidates.pairs,
-            self.candidates.gap,
-            self.candidates.impulse_n,
-            self.motion,
-            limits,
-            self.candidates.active,
-            self.like,
-        )
+        c = self.candidates
+        select_active(c.pairs, c.gap, c.impulse_n, self.motion, limits, c.active, self.like)
 
     def _free_velocities(self, rate_before: Array) -> None:
         self.free_motion[:] = self.motion
