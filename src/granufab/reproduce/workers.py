@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import queue
 import signal
 import time
 from collections.abc import Callable, Sequence
@@ -12,6 +11,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -203,10 +203,14 @@ def _run_parallel(
     tasks: _Tasks, workers: int, run_case: RunCase | None, prepare: Prepare | None
 ) -> None:
     context = multiprocessing.get_context("spawn")
-    messages, stop = context.Queue(), context.Event()
+    messages, sender = context.Pipe(duplex=False)
+    stop = context.Event()
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(
-        workers, mp_context=context, initializer=_start_worker, initargs=(messages, stop)
+        workers,
+        mp_context=context,
+        initializer=_start_worker,
+        initargs=(sender, context.Lock(), stop),
     )
     futures: dict[Future[Any], int] = {}
 
@@ -229,7 +233,7 @@ def _run_parallel(
 
 def _follow(
     futures: dict[Future[Any], int],
-    messages: Any,
+    messages: Connection,
     tasks: _Tasks,
     submit: Callable[[Sample | None, Any], None],
 ) -> None:
@@ -255,13 +259,9 @@ def _follow(
         pending |= set(futures) - known
 
 
-def _drain(messages: Any, board: _Board) -> None:
-    while True:
-        try:
-            index, text, share = messages.get_nowait()
-        except queue.Empty:
-            return
-        board.post(index, text, share)
+def _drain(messages: Connection, board: _Board) -> None:
+    while messages.poll():
+        board.post(*messages.recv())
 
 
 def _end(pool: ProcessPoolExecutor, futures: Sequence[Future[None]], others: set[Any]) -> None:
@@ -276,11 +276,10 @@ def _end(pool: ProcessPoolExecutor, futures: Sequence[Future[None]], others: set
 _channel: dict[str, Any] = {}  # of a worker process: where it reports, and the word to stop
 
 
-def _start_worker(messages: Any, stop: Any) -> None:
+def _start_worker(sender: Connection, turn: Any, stop: Any) -> None:
     # The parent decides when to stop: Ctrl-C reaches the whole group of processes.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    messages.cancel_join_thread()
-    _channel.update(messages=messages, stop=stop)
+    _channel.update(sender=sender, turn=turn, stop=stop)
 
 
 class _Stopped(KeyboardInterrupt):
@@ -302,17 +301,23 @@ def _work_sample(sample: Sample, index: int, prepare: Prepare | None) -> Any:
 
 
 def _reporter(index: int) -> Progress:
-    """Tells the parent a few times a second, and learns from it when to stop."""
+    """Tells the parent a few times a second, and learns from it when to stop.
+
+    What is told has arrived when this task's result does: it is written at once, not by a thread.
+    """
     last = [0.0]
+
+    def tell(text: str, share: float) -> None:
+        if _channel["stop"].is_set():
+            raise _Stopped
+        with _channel["turn"]:
+            _channel["sender"].send((index, text, share))
 
     def report(text: str, share: float) -> None:
         now = time.monotonic()
-        if now - last[0] < 0.2:
-            return
-        last[0] = now
-        if _channel["stop"].is_set():
-            raise _Stopped
-        _channel["messages"].put((index, text, share))
+        if now - last[0] >= 0.2:
+            last[0] = now
+            tell(text, share)
 
-    report("starting", 0.0)
+    tell("starting", 0.0)
     return report
