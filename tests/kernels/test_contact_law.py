@@ -37,7 +37,7 @@ def assert_law(p_n, p_t, u_n, u_t, mu):
 @EXAMPLES
 @given(impulses, numbers, numbers, numbers, positive, positive, frictions)
 def test_uncoupled_disks(p_n, p_t, u_n, u_t, w_n, w_t, mu):
-    new_n, (new_t,) = separate_law(p_n, (p_t,), u_n, (u_t,), w_n, w_t, mu)
+    new_n, (new_t,) = separate_law(p_n, (p_t,), u_n, (u_t,), 1 / w_n, 1 / w_t, mu)
     after_n, after_t = u_n + w_n * (new_n - p_n), u_t + w_t * (new_t - p_t)
     assert_law(new_n, new_t, after_n, after_t, mu)
 
@@ -59,7 +59,8 @@ def test_uncoupled_spheres(p_n, p_t, u_n, u_t, w_n, w_t, mu, turn):
     other = np.array([0.0, 0.0, 1.0])
     p = p_t[0] * axis + p_t[1] * other
     u = u_t[0] * axis + u_t[1] * other
-    new_n, new_t = separate_law(p_n, tuple(map(float, p)), u_n, tuple(map(float, u)), w_n, w_t, mu)
+    now, speed = tuple(map(float, p)), tuple(map(float, u))
+    new_n, new_t = separate_law(p_n, now, u_n, speed, 1 / w_n, 1 / w_t, mu)
     after_n, after_t = u_n + w_n * (new_n - p_n), u + w_t * (np.array(new_t) - p)
     assert_law(new_n, new_t, after_n, after_t, mu)
 
@@ -99,8 +100,8 @@ def test_coupled_disks_against_all_four_cases(b_n, b_t, w_nn, w_tt, share, mu):
 @given(impulses, numbers, numbers, numbers, positive, positive, frictions)
 def test_the_result_does_not_depend_on_the_impulse_it_starts_from(p_n, p_t, b_n, b_t, w_n, w_t, mu):
     """u is affine in P, so only b = u − W P matters."""
-    cold = separate_law(0.0, (0.0,), b_n, (b_t,), w_n, w_t, mu)
-    warm = separate_law(p_n, (p_t,), b_n + w_n * p_n, (b_t + w_t * p_t,), w_n, w_t, mu)
+    cold = separate_law(0.0, (0.0,), b_n, (b_t,), 1 / w_n, 1 / w_t, mu)
+    warm = separate_law(p_n, (p_t,), b_n + w_n * p_n, (b_t + w_t * p_t,), 1 / w_n, 1 / w_t, mu)
     assert warm[0] == pytest.approx(cold[0], abs=1e-9)
     assert warm[1][0] == pytest.approx(cold[1][0], abs=1e-9)
 
@@ -112,7 +113,7 @@ def test_the_result_does_not_depend_on_the_impulse_it_starts_from(p_n, p_t, b_n,
 @given(impulses, numbers, numbers, numbers, positive, positive, frictions, positive)
 @example(0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 1.0)
 def test_the_defect_vanishes_at_solutions(p_n, p_t, u_n, u_t, w_n, w_t, mu, rho):
-    new_n, (new_t,) = separate_law(p_n, (p_t,), u_n, (u_t,), w_n, w_t, mu)
+    new_n, (new_t,) = separate_law(p_n, (p_t,), u_n, (u_t,), 1 / w_n, 1 / w_t, mu)
     after_n, after_t = u_n + w_n * (new_n - p_n), u_t + w_t * (new_t - p_t)
     size = 1 + new_n + rho * (abs(after_n) + abs(after_t))
     assert cone_defect(new_n, (new_t,), after_n, (after_t,), rho, mu) <= (1e-9 * size) ** 2

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from granufab.kernels.insertion import insert_randomly
 from granufab.kernels.neighbours import (
     bin_counts,
-    conflict_free_order,
     find_pairs,
     find_wall_pairs,
     morton_order,
@@ -173,25 +172,6 @@ def _conflicts(first, second, distance=8):
         window = range(max(0, c - distance), c)
         hits += any(int(first[k]) in bodies or int(second[k]) in bodies for k in window)
     return hits / len(first)
-
-
-def test_conflict_free_order_is_a_permutation_with_few_conflicts():
-    first, second = _hexagonal_contacts()
-    order = conflict_free_order(first, second, 900, 16, 128)
-    assert sorted(order.tolist()) == list(range(len(first)))
-    before, after = _conflicts(first, second), _conflicts(first[order], second[order])
-    assert before > 0.9
-    assert after < before / 3
-
-
-@settings(deadline=None, derandomize=True, max_examples=50)
-@given(st.integers(0, 10**6), st.integers(0, 60), st.integers(2, 12))
-def test_conflict_free_order_keeps_every_contact(seed, count, bodies):
-    generator = np.random.default_rng(seed)
-    first = generator.integers(0, bodies, count).astype(np.int32)
-    second = ((first + generator.integers(1, bodies, count)) % bodies).astype(np.int32)
-    order = conflict_free_order(first, second, bodies, 16, 8)
-    assert sorted(order.tolist()) == list(range(count))
 
 
 def test_morton_order_keeps_neighbours_near():

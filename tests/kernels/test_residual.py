@@ -7,11 +7,29 @@ import math
 import numpy as np
 import pytest
 
+from granufab.kernels.impulses import apply_impulses
 from granufab.kernels.problem import Problem, State
-from granufab.kernels.solve import solve
-from granufab.kernels.sweep import apply_impulses, residual, sweep
+from granufab.simulate.contact_solver import ContactSolver
 
 BODIES, CONTACTS = 12, 20
+
+
+def solve(problem, state, tolerance, max_sweeps, cap=0.0, *, floor=1e-3, wide=False, chunks=1):
+    """Sweeps, residual, largest share, worst violation of a solve in place."""
+    solver = ContactSolver(BODIES, problem.normal.shape[1], wide=wide)
+    solver.chunk_count = chunks
+    solver.chunk[:] = np.arange(BODIES) % chunks
+    return solver.solve(problem, state, (tolerance, max_sweeps, cap, floor))
+
+
+def residual(problem, state, floor, *, wide=False):
+    """Residual, largest share, worst violation of an iterate."""
+    return solve(problem, state, 0.0, 0, floor=floor, wide=wide)[1:]
+
+
+def sweep(problem, state, *, wide=False, chunks=1):
+    """One plain sweep in place."""
+    solve(problem, state, -1.0, 1, wide=wide, chunks=chunks)
 
 
 def _random_problem(dimension, *, coupled, softness=0.0):
@@ -40,10 +58,10 @@ def _random_problem(dimension, *, coupled, softness=0.0):
         dilation_weight=0.0 if coupled else 1 / (dimension * inertia),
         weight=np.eye(dimension) / inertia if coupled else np.zeros((dimension, dimension)),
     )
-    motion = np.zeros((BODIES, 4 if dimension == 2 else 8))
+    motion = np.zeros((BODIES + 1, 4 if dimension == 2 else 8))
     ends = dimension + tangents
-    motion[:, :ends] = 0.3 * generator.standard_normal((BODIES, ends))
-    motion[:, ends] = 1 / generator.uniform(0.5, 2.0, BODIES)
+    motion[:BODIES, :ends] = 0.3 * generator.standard_normal((BODIES, ends))
+    motion[:BODIES, ends] = 1 / generator.uniform(0.5, 2.0, BODIES)
     state = State(
         motion,
         np.zeros((dimension, dimension)),
@@ -57,9 +75,9 @@ def _copy(state):
     return State(*(array.copy() for array in state))
 
 
-def _solved(problem, state, like, tolerance=1e-12):
+def _solved(problem, state, cap=0.9, **given):
     state = _copy(state)
-    found = solve(problem, state, _copy(state), like, (tolerance, 100_000, 0.9, 1e-3, 1))
+    found = solve(problem, state, 1e-12, 100_000, cap, **given)
     return state, found
 
 
@@ -69,9 +87,8 @@ CASES = [(2, False, 0.0), (2, True, 0.0), (2, True, 0.2), (3, False, 0.0), (3, F
 @pytest.mark.parametrize(("dimension", "coupled", "softness"), CASES)
 def test_the_residual_vanishes_at_the_solution_only(dimension, coupled, softness):
     problem, start = _random_problem(dimension, coupled=coupled, softness=softness)
-    like = (0.0,) * dimension
-    before = residual(problem, start, like, 1e-3)
-    state, (sweeps, found, share, violation) = _solved(problem, start, like)
+    before = residual(problem, start, 1e-3)
+    state, (sweeps, found, share, violation) = _solved(problem, start)
     assert before[0] > 1.0
     assert 5 < sweeps < 100_000
     assert found <= 1e-12
@@ -94,7 +111,7 @@ def test_the_residual_vanishes_at_the_solution_only(dimension, coupled, softness
     assert power[sliding] == pytest.approx(-(size * slip)[sliding], rel=1e-6)
     for moved in (state.impulse_n, state.impulse_t):
         moved += 1e-6
-        assert residual(problem, state, like, 1e-3)[0] > 1e-7
+        assert residual(problem, state, 1e-3)[0] > 1e-7
         moved -= 1e-6
 
 
@@ -114,14 +131,14 @@ def _velocities(problem, state):
     return along, across + problem.offset_t + problem.softness * state.impulse_t
 
 
+@pytest.mark.parametrize("wide", [False, True])
 @pytest.mark.parametrize("sweeps", [0, 1, 4])
 @pytest.mark.parametrize(("dimension", "coupled", "softness"), CASES)
-def test_the_residual_is_its_formula(dimension, coupled, softness, sweeps):
+def test_the_residual_is_its_formula(dimension, coupled, softness, sweeps, wide):
     """‖P − proj_K(P − ρ(ũ + µ|u_t| n))‖ / max(‖P‖, floor), ρ = 1/W_nn with the cell's share."""
     problem, state = _random_problem(dimension, coupled=coupled, softness=softness)
-    like = (0.0,) * dimension
     for _ in range(sweeps):
-        sweep(problem, state, like, 1)
+        sweep(problem, state, wide=wide)
     u_n, u_t = _velocities(problem, state)
     heavy = 3 if dimension == 2 else 6
     w = state.motion[problem.first, heavy] + state.motion[problem.second, heavy]
@@ -140,7 +157,7 @@ def test_the_residual_is_its_formula(dimension, coupled, softness, sweeps):
         defect[c] = ((now - target) ** 2).sum()
     size = math.sqrt((state.impulse_n**2).sum() + (state.impulse_t**2).sum())
     for floor in (1e-3, 50.0):
-        found, worst, violation = residual(problem, state, like, floor)
+        found, worst, violation = residual(problem, state, floor, wide=wide)
         assert found == pytest.approx(math.sqrt(defect.sum()) / max(size, floor), rel=1e-9)
         assert worst == pytest.approx(math.sqrt(defect.max()) / max(size, floor), rel=1e-9)
         assert violation == pytest.approx(max(0.0, -u_n.min()), abs=1e-13)
@@ -157,9 +174,8 @@ def _nearest_of_cone(n, t, mu):
 @pytest.mark.parametrize(("dimension", "coupled", "softness"), CASES)
 def test_the_residual_has_no_units(dimension, coupled, softness):
     problem, state = _random_problem(dimension, coupled=coupled, softness=softness)
-    like = (0.0,) * dimension
     for _ in range(2):
-        sweep(problem, state, like, 1)
+        sweep(problem, state)
     length, mass, time = 3.3e-3, 7.7e4, 0.021
     speed = length / time
     scaled = problem._replace(
@@ -179,8 +195,8 @@ def test_the_residual_has_no_units(dimension, coupled, softness):
         state.impulse_n * mass * speed,
         state.impulse_t * mass * speed,
     )
-    one = residual(problem, state, like, 0.7)
-    two = residual(scaled, other, like, 0.7 * mass * speed)
+    one = residual(problem, state, 0.7)
+    two = residual(scaled, other, 0.7 * mass * speed)
     assert two[:2] == pytest.approx(one[:2], rel=1e-12)
     assert two[2] == pytest.approx(one[2] * speed, rel=1e-12)
 
@@ -195,31 +211,41 @@ def test_an_open_frictionless_contact_is_no_defect(dimension):
         offset_t=np.zeros_like(problem.offset_t),
     )
     state.motion[:, : -1 if dimension == 2 else 6] = 0.0
-    assert residual(quiet, state, (0.0,) * dimension, 1.0)[:2] == (0.0, 0.0)
+    assert residual(quiet, state, 1.0)[:2] == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(("dimension", "coupled", "softness"), CASES)
-@pytest.mark.parametrize("lag", [1, 7, 64])
-def test_sweeps_keep_velocities_and_impulses_together(dimension, coupled, softness, lag):
+@pytest.mark.parametrize(("wide", "chunks"), [(False, 1), (False, 4), (True, 1), (True, 3)])
+def test_sweeps_keep_velocities_and_impulses_together(dimension, coupled, softness, wide, chunks):
     """v = v_free + M⁻¹ H P after any sweep, however late the cell hears of it."""
     problem, state = _random_problem(dimension, coupled=coupled, softness=softness)
-    like = (0.0,) * dimension
     free = _copy(state)
     for _ in range(3):
-        sweep(problem, state, like, lag)
+        sweep(problem, state, wide=wide, chunks=chunks)
     afresh = State(free.motion, free.rate, state.impulse_n, state.impulse_t)
-    apply_impulses(problem, afresh, like)
+    apply_impulses(problem, afresh, (0.0,) * dimension)
     assert afresh.motion == pytest.approx(state.motion, abs=1e-13)
     assert afresh.rate == pytest.approx(state.rate, abs=1e-14)
     assert np.abs(state.rate).max() > 1e-3
 
 
+@pytest.mark.parametrize(("dimension", "coupled", "softness"), CASES)
+def test_eight_at_once_do_what_one_at_a_time_does(dimension, coupled, softness):
+    problem, one = _random_problem(dimension, coupled=coupled, softness=softness)
+    two = _copy(one)
+    for _ in range(5):
+        sweep(problem, one)
+        sweep(problem, two, wide=True)
+    for first, second in zip(one, two, strict=True):
+        assert second == pytest.approx(first, rel=1e-11, abs=1e-13)
+    assert (one.impulse_n > 0).any()
+
+
+@pytest.mark.parametrize("chunks", [1, 3])
 @pytest.mark.parametrize("cap", [0.0, 0.5, 0.9])
-def test_momentum_does_not_move_the_solution(cap):
+def test_momentum_and_chunks_do_not_move_the_solution(cap, chunks):
     problem, start = _random_problem(2, coupled=True, softness=0.2)
-    like = (0.0, 0.0)
-    one, _ = _solved(problem, start, like)
-    two = _copy(start)
-    solve(problem, two, _copy(start), like, (1e-12, 100_000, cap, 1e-3, 1))
+    one, _ = _solved(problem, start)
+    two, _ = _solved(problem, start, cap, chunks=chunks)
     assert two.motion == pytest.approx(one.motion, abs=1e-10)
     assert two.impulse_n == pytest.approx(one.impulse_n, abs=1e-9)

@@ -7,11 +7,13 @@ import pytest
 from numba import njit
 
 from granufab.kernels import vectors as v
+from granufab.kernels.access import address
+from granufab.kernels.cell import add_outer, cell_weight
 
 dot, norm, norm2, add, sub, scale, axpy = v.dot, v.norm, v.norm2, v.add, v.sub, v.scale, v.axpy
 matvec, tangential, slip, moment, compose = v.matvec, v.tangential, v.slip, v.moment, v.compose
 load, load_tangent, store, spin, store_spin = v.load, v.load_tangent, v.store, v.spin, v.store_spin
-inverse_mass, add_outer, cell_weight = v.inverse_mass, v.add_outer, v.cell_weight
+inverse_mass = v.inverse_mass
 
 LOADED = ("plain", "compiled")
 
@@ -35,12 +37,12 @@ def _algebra(a, b, n, matrix):
 @njit
 def _contact(s, p_t, n, weight, target):
     push = compose(n, 0.7, p_t)
-    add_outer(target, weight, push, n)
+    add_outer(address(target), address(weight), push, n)
     return (
         slip(s, n),
         moment(n, p_t),
         push,
-        cell_weight(weight, n, 1.3),
+        cell_weight(address(weight), n, 1.3),
         norm(p_t),
         add(s, p_t),
         sub(s, p_t),

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from granufab.kernels.impulses import local_velocity
 from granufab.kernels.options import kernel
 from granufab.kernels.problem import Problem
-from granufab.kernels.sweep import local_velocity
 from granufab.kernels.vectors import (
     compose,
     dot,

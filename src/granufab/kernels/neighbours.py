@@ -11,7 +11,7 @@ import numpy as np
 
 from granufab.kernels.options import kernel
 
-__all__ = ["bin_counts", "conflict_free_order", "find_pairs", "find_wall_pairs", "morton_order"]
+__all__ = ["bin_counts", "find_pairs", "find_wall_pairs", "morton_order"]
 
 
 @kernel
@@ -158,43 +158,3 @@ def morton_order(position, origin, inverse):
             for bit in range(bits):
                 keys[i] |= ((place >> bit) & 1) << (bit * dimension + k)
     return np.argsort(keys)
-
-
-@kernel
-def conflict_free_order(first, second, body_count, batch, window):
-    """Reorder contacts so that runs of ``batch`` share no body, chosen from a sliding window.
-
-    Successive updates are then independent and the processor overlaps them. Greedy: the next
-    contact is the first in the window that touches no body of the current batch, else the first.
-    """
-    count = len(first)
-    order = np.empty(count, np.int64)
-    waiting = np.empty(window, np.int64)
-    stamp = np.full(body_count, -1, np.int64)
-    filled, taken, made, current, in_batch = 0, 0, 0, 0, 0
-    while made < count:
-        while filled < window and taken < count:
-            waiting[filled] = taken
-            filled += 1
-            taken += 1
-        chosen = -1
-        for w in range(filled):
-            c = waiting[w]
-            if stamp[first[c]] != current and stamp[second[c]] != current:
-                chosen = w
-                break
-        if chosen < 0 or in_batch == batch:
-            current += 1
-            in_batch = 0
-            if chosen < 0:
-                chosen = 0
-        c = waiting[chosen]
-        order[made] = c
-        made += 1
-        in_batch += 1
-        stamp[first[c]] = current
-        stamp[second[c]] = current
-        for w in range(chosen, filled - 1):
-            waiting[w] = waiting[w + 1]
-        filled -= 1
-    return order

@@ -16,10 +16,13 @@ from typing import Any, TypeVar
 from numba import njit
 from numba.core import config
 
-__all__ = ["ARITHMETIC", "cache_folder", "kernel"]
+__all__ = ["ARITHMETIC", "INLINED", "cache_folder", "inlined", "kernel"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 ARITHMETIC: dict[str, Any] = {"fastmath": {"contract", "nsz", "nnan"}, "error_model": "numpy"}
+
+INLINED: dict[str, Any] = {**ARITHMETIC, "forceinline": True}
+"""Options of small functions that kernels are made of: never called, always inlined."""
 
 
 def cache_folder() -> str:
@@ -50,4 +53,10 @@ config.CACHE_DIR = cache_folder()  # type: ignore[attr-defined]
 def kernel(function: F) -> F:
     """Compile ``function`` with the package's options, cached on disk, releasing the GIL."""
     compiled: Any = njit(cache=True, nogil=True, **ARITHMETIC)(function)
+    return compiled
+
+
+def inlined(function: F) -> F:
+    """Compile ``function`` as a part of the kernels that call it."""
+    compiled: Any = njit(nogil=True, **INLINED)(function)
     return compiled

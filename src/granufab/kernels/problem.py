@@ -1,4 +1,4 @@
-"""One step's contact problem as flat arrays, shared by sweep, residual and solver kernels."""
+"""One step's contact problem as flat arrays."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ class Problem(NamedTuple):
     """What is frozen during the solve of one step.
 
     Attributes:
-        first, second: bodies i, j of each contact, in sweep order, shape (contact_count,).
+        first, second: bodies i, j of each contact, shape (contact_count,).
         normal: from i to j [-], shape (contact_count, D).
         length: |branch| [m], shape (contact_count,).
         offset_n, offset_t: velocity offsets b (gap, bounce, imposed flow, spring memory) [m/s],

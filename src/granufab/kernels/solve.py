@@ -7,62 +7,235 @@ affine in the impulses, so both are extrapolated alike. The residual is taken on
 unextrapolated iterate, when the step norm promises that it is met, and at least every ``CHECK``
 sweeps. Where five checks bring no progress another cap is tried: on rare steps momentum circles
 around the solution while plain sweeps converge, on others it is the other way round.
+
+Members of a team share the chunks of contacts; the first of them decides. What is computed does
+not depend on how many they are.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from granufab.kernels.cell import move_cell
 from granufab.kernels.options import kernel
-from granufab.kernels.problem import Problem, State
-from granufab.kernels.sweep import residual, sweep
+from granufab.kernels.slots import Slots
+from granufab.kernels.sweep import Law, defects, sweep
+from granufab.kernels.team import meet
 
-__all__ = ["CHECK", "extrapolate", "solve"]
+__all__ = ["CHECK", "CONTROLS", "SUMS", "Work", "solve"]
 
 CHECK = 40
 GROWTH = 1.02
 CAUTION = 1.3
 RECOVERY = 15
 PROGRESS, PATIENCE = 0.9, 5
+BETA, DONE, SWEEPS, RESIDUAL, SHARE, VIOLATION, LOOK, RELATIVE = range(8)
+CONTROLS, SUMS = 8, 8
+
+
+class Work(NamedTuple):
+    """Memory of a solve, shared by a team.
+
+    Attributes:
+        before: body velocities of the iterate before, shape of ``bodies``.
+        cells: (free rates, push, scratch) of the cell as each chunk sees it, and last for all,
+            shape (chunk_count + 2, 3, D, D).
+        rate_before: free rates of the iterate before, shape (D, D).
+        sums: of every chunk, shape (chunk_count + 1, SUMS).
+        control: what the first member decided, shape (CONTROLS,).
+        counters: of the barrier, shape (COUNTERS,).
+    """
+
+    before: np.ndarray
+    cells: np.ndarray
+    rate_before: np.ndarray
+    sums: np.ndarray
+    control: np.ndarray
+    counters: np.ndarray
 
 
 @kernel
-def extrapolate(now, before, beta):
-    """now ← now + β (now − before), before ← now, for every item of two equal arrays."""
-    for i in range(now.shape[0]):
-        for k in range(now.shape[1]):
-            value = now[i, k]
-            now[i, k] = value + beta * (value - before[i, k])
+def solve(slots: Slots, bodies, law: Law, work: Work, like, size, settings, member, members):
+    """Sweep until the residual is met or the sweeps run out.
+
+    Args:
+        slots: packed contacts: warm start in, solution out.
+        bodies: velocities consistent with the impulses, shape (body_count + 1, 4 or 8).
+        law: shared by all contacts.
+        work: memory; ``work.cells[-1, 0]`` holds the free rates of the cell, in and out.
+        like: width and dimension of the kernels (``access``).
+        size: numbers of a batch.
+        settings: (tolerance, max_sweeps, momentum cap (0: plain), floor p d^{D−1} h).
+        member, members: number of this thread, and how many solve together.
+    Returns:
+        sweeps, residual, largest single share, worst violation [m/s].
+    """
+    control = work.control
+    if member == 0:
+        _begin(work)
+    meet(work.counters, members)
+    _remember(bodies, work, member, members)
+    _judge(slots, bodies, law, work, like, size, settings, member, members)
+    state = (settings[2], settings[2], 0, 0, np.inf)
+    watch = (0, np.inf, 0, 1.0)
+    while control[DONE] == 0.0:
+        _extrapolate(bodies, work, control[BETA], member, members)
+        meet(work.counters, members)
+        _sweep_all(slots, bodies, law, work, like, size, member, members)
+        if member == 0:
+            state, watch = _decide(work, settings, state, watch)
+        meet(work.counters, members)
+        if control[LOOK] == 1.0:
+            _judge(slots, bodies, law, work, like, size, settings, member, members)
+            if member == 0:
+                state, watch = _consider(work, settings, state, watch)
+            meet(work.counters, members)
+    return int(control[SWEEPS]), control[RESIDUAL], control[SHARE], control[VIOLATION]
+
+
+@kernel
+def _begin(work: Work):
+    work.control[:] = 0.0
+    work.sums[:] = 0.0
+    work.rate_before[:] = work.cells[-1, 0]
+
+
+@kernel
+def _rows(count, member, members):
+    """Share of the bodies of a member."""
+    return count * member // members, count * (member + 1) // members
+
+
+@kernel
+def _remember(bodies, work: Work, member, members):
+    first, end = _rows(len(bodies), member, members)
+    work.before[first:end] = bodies[first:end]
+
+
+@kernel
+def _extrapolate(bodies, work: Work, beta, member, members):
+    """now ← now + β (now − before), before ← now, for this member's bodies (first: the cell)."""
+    first, end = _rows(len(bodies), member, members)
+    before = work.before
+    for i in range(first, end):
+        for k in range(bodies.shape[1]):
+            value = bodies[i, k]
+            bodies[i, k] = value + beta * (value - before[i, k])
             before[i, k] = value
+    if member == 0:
+        rate = work.cells[-1, 0]
+        for k in range(len(rate)):
+            for l in range(len(rate)):
+                value = rate[k, l]
+                rate[k, l] = value + beta * (value - work.rate_before[k, l])
+                work.rate_before[k, l] = value
 
 
 @kernel
-def extrapolate_line(now, before, beta):
-    """:func:`extrapolate` for one-dimensional arrays."""
-    for i in range(len(now)):
-        value = now[i]
-        now[i] = value + beta * (value - before[i])
-        before[i] = value
+def _sweep_all(slots: Slots, bodies, law: Law, work: Work, like, size, member, members):
+    """One sweep over all chunks, then over the contacts between them."""
+    chunks = len(slots.starts) - 2
+    beta, cells = work.control[BETA], work.cells
+    for chunk in range(member, chunks, members):
+        cells[chunk, 0] = cells[-1, 0]
+        cells[chunk, 1:] = 0.0
+        reach = (slots.starts[chunk], slots.starts[chunk + 1], beta, float(chunks))
+        moved, length2 = sweep(slots, bodies, law, reach, cells[chunk], like, size)
+        work.sums[chunk, 0], work.sums[chunk, 1] = moved, length2
+    meet(work.counters, members)
+    if member == 0:
+        shared = cells[-1]
+        for chunk in range(chunks):
+            move_cell(shared[0], cells[chunk, 1])
+        shared[1:] = 0.0
+        reach = (slots.starts[chunks], slots.starts[chunks + 1], beta, 1.0)
+        moved, length2 = sweep(slots, bodies, law, reach, shared, like, size)
+        work.sums[chunks, 0], work.sums[chunks, 1] = moved, length2
 
 
 @kernel
-def remember(state: State, before: State):
-    """Copy the iterate."""
-    before.motion[:] = state.motion
-    before.rate[:] = state.rate
-    before.impulse_n[:] = state.impulse_n
-    before.impulse_t[:] = state.impulse_t
+def _decide(work: Work, settings, state, watch):
+    """After a sweep: the momentum of the next one, and whether the residual is to be taken."""
+    tolerance, max_sweeps, first_cap, floor = settings
+    cap, highest, age, calm, last = state
+    since, best, stale, ratio = watch
+    moved, length2 = 0.0, 0.0
+    for k in range(len(work.sums)):
+        moved += work.sums[k, 0]
+        length2 += work.sums[k, 1]
+    step = np.sqrt(moved)
+    relative = step / max(np.sqrt(length2), floor)
+    control = work.control
+    control[SWEEPS] += 1.0
+    since += 1
+    spent = control[SWEEPS] >= max_sweeps
+    control[LOOK] = 1.0 if relative * ratio < tolerance or since >= CHECK or spent else 0.0
+    control[RELATIVE] = relative
+    if first_cap > 0.0 and not spent:
+        if step > GROWTH * last:
+            age, calm = 0, 0
+            cap = max(0.0, 1.0 - CAUTION * (1.0 - cap))
+        else:
+            calm += 1
+            if calm == RECOVERY:
+                calm = 0
+                cap = min(highest, 1.0 - (1.0 - cap) / CAUTION)
+        last = step
+        control[BETA] = min(age / (age + 3.0), cap)
+        age += 1
+    return (cap, highest, age, calm, last), (since, best, stale, ratio)
 
 
 @kernel
-def impulse_norm(state: State):
-    """‖P‖₂ over all contacts [N s]."""
-    total = 0.0
-    for c in range(len(state.impulse_n)):
-        total += state.impulse_n[c] ** 2
-        for k in range(state.impulse_t.shape[1]):
-            total += state.impulse_t[c, k] ** 2
-    return np.sqrt(total)
+def _consider(work: Work, settings, state, watch):
+    """After the residual was taken: done, or another cap where nothing moves."""
+    cap, highest, age, calm, last = state
+    since, best, stale, ratio = watch
+    control = work.control
+    found, due = control[RESIDUAL], since >= CHECK
+    ratio = max(0.2, 0.9 * found / max(control[RELATIVE], 1e-300))
+    if due:
+        stale += 1
+    if found < PROGRESS * best:
+        best, stale = found, 0
+    if stale == PATIENCE:
+        stale = 0
+        highest = next_cap(highest, settings[2])
+        cap, calm, age = highest, 0, 0
+        control[BETA] = 0.0
+    if control[SWEEPS] >= settings[1]:
+        control[DONE] = 1.0
+    return (cap, highest, age, calm, last), (0, best, stale, ratio)
+
+
+@kernel
+def _judge(slots: Slots, bodies, law: Law, work: Work, like, size, settings, member, members):
+    """Take the residual; done where it is met or no sweeps are allowed."""
+    chunks = len(slots.starts) - 1
+    for chunk in range(member, chunks, members):
+        reach = (slots.starts[chunk], slots.starts[chunk + 1])
+        far, worst, length2, violation = defects(
+            slots, bodies, law, reach, work.cells[-1], like, size
+        )
+        work.sums[chunk, 2], work.sums[chunk, 3] = far, worst
+        work.sums[chunk, 4], work.sums[chunk, 5] = length2, violation
+    meet(work.counters, members)
+    if member == 0:
+        total, worst, length2, violation = 0.0, 0.0, 0.0, 0.0
+        for k in range(chunks):
+            total += work.sums[k, 2]
+            worst = max(worst, work.sums[k, 3])
+            length2 += work.sums[k, 4]
+            violation = max(violation, work.sums[k, 5])
+        size2 = max(np.sqrt(length2), settings[3])
+        control = work.control
+        control[RESIDUAL] = np.sqrt(total) / size2
+        control[SHARE], control[VIOLATION] = np.sqrt(worst) / size2, violation
+        if control[RESIDUAL] <= settings[0] or settings[1] == 0:
+            control[DONE] = 1.0
+    meet(work.counters, members)
 
 
 @kernel
@@ -71,64 +244,3 @@ def next_cap(cap, first):
     if cap > 0.2:
         return 0.5 * cap
     return 0.0 if cap > 0.0 else first
-
-
-@kernel
-def solve(problem: Problem, state: State, before: State, like, settings):
-    """Sweep until the residual is met or the sweeps run out.
-
-    Args:
-        problem: the step's contact problem.
-        state: warm start in, solution out; velocities consistent with the impulses.
-        before: scratch of the same shapes.
-        like: tuple of D zeros.
-        settings: (tolerance, max_sweeps, momentum cap (0: plain), floor p d^{D−1} h, lag).
-    Returns:
-        sweeps, residual, largest single share, worst violation [m/s].
-    """
-    tolerance, max_sweeps, cap, floor, lag = settings
-    found = residual(problem, state, like, floor)
-    sweeps = 0
-    since_check, momentum_age, last_step = 0, 0, np.inf
-    highest, calm = cap, 0
-    best, stale = np.inf, 0
-    ratio = 1.0
-    remember(state, before)
-    while found[0] > tolerance and sweeps < max_sweeps:
-        step = np.sqrt(sweep(problem, state, like, lag))
-        sweeps += 1
-        since_check += 1
-        relative = step / max(impulse_norm(state), floor)
-        if relative * ratio < tolerance or since_check >= CHECK or sweeps == max_sweeps:
-            due = since_check >= CHECK
-            since_check = 0
-            found = residual(problem, state, like, floor)
-            ratio = max(0.2, 0.9 * found[0] / max(relative, 1e-300))
-            if found[0] <= tolerance:
-                break
-            if due:
-                stale += 1
-            if found[0] < PROGRESS * best:
-                best, stale = found[0], 0
-            if stale == PATIENCE:
-                stale = 0
-                highest = next_cap(highest, settings[2])
-                cap, calm, momentum_age = highest, 0, 0
-        if settings[2] > 0.0 and sweeps < max_sweeps:
-            if step > GROWTH * last_step:
-                momentum_age = 0
-                cap = max(0.0, 1.0 - CAUTION * (1.0 - cap))
-                calm = 0
-            else:
-                calm += 1
-                if calm == RECOVERY:
-                    calm = 0
-                    cap = min(highest, 1.0 - (1.0 - cap) / CAUTION)
-            last_step = step
-            beta = min(momentum_age / (momentum_age + 3.0), cap)
-            momentum_age += 1
-            extrapolate(state.motion, before.motion, beta)
-            extrapolate(state.rate, before.rate, beta)
-            extrapolate_line(state.impulse_n, before.impulse_n, beta)
-            extrapolate(state.impulse_t, before.impulse_t, beta)
-    return sweeps, found[0], found[1], found[2]

@@ -1,189 +1,248 @@
-"""Gauss–Seidel sweep over the contacts, and what goes with it.
+"""Gauss–Seidel sweep over the contacts, and how far an iterate is from the law.
 
 Both bodies are loaded into locals, the contact is solved exactly, the change is stored: a local
-Signorini–Coulomb problem per contact (``contact_law``). The cell's free rates are one more body;
-their change is handed on every ``lag`` contacts, which frees the sweep of a serial dependency.
+Signorini–Coulomb problem per contact (``contact_law``). The text is the same for one contact and
+for a batch of eight that share no body. The cell's free rates are one more body; their change is
+handed on every ``LAG`` contacts, which frees the sweep of a serial dependency.
+
+Chunks of contacts may be swept side by side: each then takes the cell to move as if the others
+pushed it alike (its own push times the number of chunks); the sum of the true pushes is applied
+after all chunks. At the solution no push is left, so the result is the same.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from granufab.kernels.contact_law import cone_defect, coupled_law, separate_law
-from granufab.kernels.options import kernel
-from granufab.kernels.problem import Problem, State
+from granufab.kernels.access import (
+    address,
+    body_of,
+    greatest,
+    inverse_mass_of,
+    like_numbers,
+    put,
+    put_body,
+    put_tangent,
+    spin_of,
+    stride,
+    summed,
+    take,
+    take_body,
+    take_tangent,
+    take_vector,
+    velocity_of,
+)
+from granufab.kernels.cell import add_outer, cell_weight, hand_on, stretching
+from granufab.kernels.contact_law import cone_defect, crossed_law, separate_law
+from granufab.kernels.lanes import WIDTH
+from granufab.kernels.options import inlined, kernel
+from granufab.kernels.slots import Slots, places
 from granufab.kernels.vectors import (
     add,
-    add_outer,
     axpy,
-    cell_weight,
     compose,
     dot,
-    inverse_mass,
-    load,
-    load_tangent,
-    matvec,
     moment,
     norm2,
     scale,
     slip,
-    spin,
-    store,
-    store_spin,
     sub,
     tangential,
 )
 
-__all__ = ["apply_impulses", "local_velocity", "residual", "sweep"]
+__all__ = ["Law", "defects", "sweep"]
+
+LAG = 64
+
+
+class Law(NamedTuple):
+    """What all contacts of a solve share (see :class:`granufab.kernels.problem.Problem`)."""
+
+    softness: float
+    spin_factor: float
+    coupled: bool
+    dilation_weight: float
+    weight: np.ndarray
+
+
+class _Numbers(NamedTuple):
+    """:class:`Law` without its array."""
+
+    softness: float
+    spin_factor: float
+    coupled: bool
+    dilation_weight: float
+
+
+@inlined
+def numbers_of(law: Law):
+    """The numbers of the law."""
+    return _Numbers(law.softness, law.spin_factor, law.coupled, law.dilation_weight)
 
 
 @kernel
-def sweep(problem: Problem, state: State, like, lag):
-    """One forward Gauss–Seidel sweep; returns Σ|ΔP|² over the contacts [N² s²]."""
-    motion, rate = state.motion, state.rate
-    pending = np.zeros_like(rate)
-    dilation = rate[0, 0]
-    pending_dilation = 0.0
-    eps, kappa = problem.softness, problem.spin_factor
-    w_cell = problem.dilation_weight
-    moved, until = 0.0, lag
-    for c in range(len(problem.length)):
-        i, j = problem.first[c], problem.second[c]
-        n, length = load(problem.normal, c, like), problem.length[c]
-        s_i, s_j = spin(motion, i, like), spin(motion, j, like)
-        m_i, m_j = inverse_mass(motion, i, like), inverse_mass(motion, j, like)
-        v_i, v_j = load(motion, i, like), load(motion, j, like)
-        p_n, p_t = state.impulse_n[c], load_tangent(state.impulse_t, c, like)
-        u = sub(v_j, v_i)
-        if problem.coupled:
-            u = add(u, scale(length, matvec(rate, n)))
-        u_n = dot(n, u)
-        u_t = sub(tangential(u, n, u_n), slip(add(s_i, s_j), n))
-        u_n += problem.offset_n[c] + eps * p_n
-        u_t = add(u_t, axpy(eps, p_t, load_tangent(problem.offset_t, c, like)))
-        mass = m_i + m_j
-        w_t = mass + kappa * mass + eps
-        if problem.coupled:
-            extra_n, extra_nt, extra_t = cell_weight(problem.weight, n, length)
-            new_n, new_t = coupled_law(
-                p_n, p_t, u_n, u_t, mass + eps + extra_n, extra_nt, w_t + extra_t, problem.mu[c]
-            )
-        else:
-            u_n += dilation * length
-            w_n = mass + eps + length * length * w_cell
-            new_n, new_t = separate_law(p_n, p_t, u_n, u_t, w_n, w_t, problem.mu[c])
-        d_n, d_t = new_n - p_n, sub(new_t, p_t)
-        moved += d_n * d_n + norm2(d_t)
-        state.impulse_n[c] = new_n
-        store(state.impulse_t, c, new_t)
-        push = compose(n, d_n, d_t)
-        turn = scale(-kappa, moment(n, d_t))
-        store(motion, i, axpy(-m_i, push, v_i))
-        store(motion, j, axpy(m_j, push, v_j))
-        store_spin(motion, i, axpy(m_i, turn, s_i), like)
-        store_spin(motion, j, axpy(m_j, turn, s_j), like)
-        if problem.coupled:
-            add_outer(pending, problem.weight, push, scale(length, n))
-        else:
-            pending_dilation += w_cell * length * d_n
+def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
+    """One forward sweep over some batches.
+
+    Impulses start from y = x + β (x − x_before); bodies hold the velocities of y already.
+
+    Args:
+        slots: contacts; impulses and their values before are changed.
+        bodies: velocities, changed.
+        shared: by all contacts.
+        reach: (first batch, end, momentum β, chunks swept side by side).
+        cell: free rates L of the cell, in the end with what these contacts added; the sum of
+            their pushes; scratch; shape (3, D, D).
+        like: width and dimension of the kernel (``access``).
+        size: numbers of a batch.
+    Returns:
+        Σ|x_new − y|², Σ|x_new|² [N² s²].
+    """
+    start, end, beta, together = reach
+    values, one, two = address(slots.values), address(slots.first), address(slots.second)
+    law, weight, table = numbers_of(shared), address(shared.weight), address(bodies)
+    rate, push, scratch = cell[0], cell[1], cell[2]
+    flow, pushes = address(rate), address(scratch)
+    dilation, pushed, pending = rate[0, 0], 0.0, 0.0
+    moved, length2 = 0.0, 0.0
+    until = LAG // WIDTH
+    for batch in range(start, end):
+        for lane in range(0, WIDTH, stride(like)):
+            base, place = batch * size + lane, batch * WIDTH + lane
+            step, new, turn = _visit(
+                values, one, two, table, base, place,
+                law, beta, dilation, flow, pushes, weight, like,
+            )  # fmt: skip
+            moved += step
+            length2 += new
+            pending += turn
         until -= 1
         if until == 0:
-            until = lag
-            dilation += pending_dilation
-            pending_dilation = 0.0
-            if problem.coupled:
-                hand_on(rate, pending)
-    if problem.coupled:
-        hand_on(rate, pending)
+            until = LAG // WIDTH
+            if law.coupled:
+                hand_on(rate, push, scratch, together)
+            dilation += together * pending
+            pushed += pending
+            pending = 0.0
+    if law.coupled:
+        hand_on(rate, push, scratch, together)
     else:
-        set_diagonal(rate, dilation + pending_dilation)
-    return moved
+        for k in range(len(rate)):
+            rate[k, k] = dilation + together * pending
+            push[k, k] += pushed + pending
+    return moved, length2
 
 
-@kernel
-def hand_on(rate, pending):
-    """Add the pending change to the free cell rates and clear it."""
-    for k in range(len(rate)):
-        for l in range(len(rate)):
-            rate[k, l] += pending[k, l]
-            pending[k, l] = 0.0
+@inlined
+def _visit(
+    values, one, two, bodies, base, place, law, beta, dilation, rate, scratch, weight, like
+):  # fmt: skip
+    """Solve one contact (or eight); returns |ΔP|², |P|² and the push on the dilation."""
+    numbers = like_numbers(like)
+    at = places(numbers)
+    body_i = take_body(bodies, one, place, numbers)
+    body_j = take_body(bodies, two, place, numbers)
+    n = take_vector(values, base, at.normal, numbers)
+    length = take(values, base, at.length, numbers)
+    x_n = take(values, base, at.impulse_n, numbers)
+    x_t = take_tangent(values, base, at.impulse_t, numbers)
+    y_n = x_n + beta * (x_n - take(values, base, at.before_n, numbers))
+    y_t = axpy(beta, sub(x_t, take_tangent(values, base, at.before_t, numbers)), x_t)
+    u_n, u_t = _velocity(body_i, body_j, n, length, law, dilation, rate)
+    u_n = u_n + (take(values, base, at.offset_n, numbers) + law.softness * y_n)
+    u_t = add(u_t, take_tangent(values, base, at.offset_t, numbers))
+    u_t = axpy(law.softness, y_t, u_t)
+    w_n = take(values, base, at.inverse_n, numbers)
+    w_t = take(values, base, at.inverse_t, numbers)
+    mu = take(values, base, at.mu, numbers)
+    if law.coupled and len(numbers) == 2:
+        cross = take(values, base, at.cross, numbers)
+        new_n, new_t = crossed_law(y_n, y_t, u_n, u_t, w_n, cross, w_t, mu)
+    else:
+        new_n, new_t = separate_law(y_n, y_t, u_n, u_t, w_n, w_t, mu)
+    d_n, d_t = new_n - y_n, sub(new_t, y_t)
+    put(values, base, at.before_n, x_n)
+    put_tangent(values, base, at.before_t, x_t)
+    put(values, base, at.impulse_n, new_n)
+    put_tangent(values, base, at.impulse_t, new_t)
+    push = compose(n, d_n, d_t)
+    turn = scale(-1.0 * law.spin_factor, moment(n, d_t))
+    m_i, m_j = inverse_mass_of(body_i), inverse_mass_of(body_j)
+    v_i = axpy(-1.0 * m_i, push, velocity_of(body_i))
+    v_j = axpy(m_j, push, velocity_of(body_j))
+    put_body(bodies, one, place, body_of(v_i, axpy(m_i, turn, spin_of(body_i)), body_i))
+    put_body(bodies, two, place, body_of(v_j, axpy(m_j, turn, spin_of(body_j)), body_j))
+    if law.coupled:
+        add_outer(scratch, weight, push, scale(length, n))
+    stretched = law.dilation_weight * summed(length * d_n)
+    return summed(d_n * d_n + norm2(d_t)), summed(new_n * new_n + norm2(new_t)), stretched
 
 
-@kernel
-def set_diagonal(rate, dilation):
-    """Write a uniform dilation rate."""
-    for k in range(len(rate)):
-        rate[k, k] = dilation
-
-
-@kernel
-def local_velocity(problem: Problem, motion, rate, c, like):
-    """(u_n, u_t) of contact c without offsets: grains and free cell rates only [m/s]."""
-    i, j = problem.first[c], problem.second[c]
-    n = load(problem.normal, c, like)
-    u = add(
-        sub(load(motion, j, like), load(motion, i, like)),
-        scale(problem.length[c], matvec(rate, n)),
-    )
+@inlined
+def _velocity(body_i, body_j, n, length, law, dilation, rate):
+    """(u_n, u_t) of grains and free cell, without offsets."""
+    u = sub(velocity_of(body_j), velocity_of(body_i))
+    if law.coupled:
+        u = add(u, scale(length, stretching(rate, n)))
     u_n = dot(n, u)
-    turning = slip(add(spin(motion, i, like), spin(motion, j, like)), n)
-    return u_n, sub(tangential(u, n, u_n), turning)
+    u_t = sub(tangential(u, n, u_n), slip(add(spin_of(body_i), spin_of(body_j)), n))
+    if not law.coupled:
+        u_n = u_n + dilation * length
+    return u_n, u_t
 
 
 @kernel
-def residual(problem: Problem, state: State, like, floor):
-    """How far the iterate is from the law: ‖P − proj_K(P − ρ(ũ + µ|u_t| n))‖ / max(‖P‖, floor).
+def defects(slots: Slots, bodies, shared: Law, reach, cell, like, size):
+    """What some batches add to the residual ‖P − proj_K(P − ρ(ũ + µ|u_t| n))‖ / ‖P‖.
 
-    ρ_c = 1/W_nn,c with the cell's share; ũ holds every offset and the spring. ``floor`` is
-    p d^{D−1} h [N s].
+    ρ = 1/W_nn with the cell's share; ũ holds every offset and the spring.
 
+    Args:
+        slots, bodies, shared, like, size: as for :func:`sweep`; nothing is changed.
+        reach: (first batch, end).
+        cell: free rates L first, shape (3, D, D).
     Returns:
-        residual [-], the largest single contact's share [-], worst violation −ũ_n [m/s].
+        Σ of squared distances, the largest, Σ|P|² [N² s²], worst violation −ũ_n [m/s].
     """
-    total, worst, size, violation = 0.0, 0.0, 0.0, 0.0
-    eps = problem.softness
-    for c in range(len(problem.length)):
-        n = load(problem.normal, c, like)
-        length = problem.length[c]
-        p_n, p_t = state.impulse_n[c], load_tangent(state.impulse_t, c, like)
-        u_n, u_t = local_velocity(problem, state.motion, state.rate, c, like)
-        u_n += problem.offset_n[c] + eps * p_n
-        u_t = add(u_t, axpy(eps, p_t, load_tangent(problem.offset_t, c, like)))
-        w_n = inverse_mass(state.motion, problem.first[c], like)
-        w_n += inverse_mass(state.motion, problem.second[c], like)
-        if problem.coupled:
-            w_n += cell_weight(problem.weight, n, length)[0]
-        else:
-            w_n += length * length * problem.dilation_weight
-        defect = cone_defect(p_n, p_t, u_n, u_t, 1.0 / w_n, problem.mu[c])
-        total += defect
-        worst = max(worst, defect)
-        size += p_n * p_n + norm2(p_t)
-        violation = max(violation, -u_n)
-    scale_ = max(np.sqrt(size), floor)
-    return np.sqrt(total) / scale_, np.sqrt(worst) / scale_, violation
+    total, worst, length2, violation = 0.0, 0.0, 0.0, 0.0
+    values, one, two = address(slots.values), address(slots.first), address(slots.second)
+    law, weight, table = numbers_of(shared), address(shared.weight), address(bodies)
+    rate, dilation = address(cell), cell[0, 0, 0]
+    for batch in range(reach[0], reach[1]):
+        for lane in range(0, WIDTH, stride(like)):
+            base, place = batch * size + lane, batch * WIDTH + lane
+            far, new, u_n = _defect(
+                values, one, two, table, base, place, law, dilation, rate, weight, like
+            )
+            total += summed(far)
+            worst = max(worst, greatest(far))
+            length2 += summed(new)
+            violation = max(violation, greatest(-1.0 * u_n))
+    return total, worst, length2, violation
 
 
-@kernel
-def apply_impulses(problem: Problem, state: State, like):
-    """Add M⁻¹ H P of every contact to motion and rate, which hold the free velocities."""
-    motion, rate = state.motion, state.rate
-    dilation = 0.0
-    for c in range(len(problem.length)):
-        i, j = problem.first[c], problem.second[c]
-        n = load(problem.normal, c, like)
-        p_n, p_t = state.impulse_n[c], load_tangent(state.impulse_t, c, like)
-        m_i, m_j = inverse_mass(motion, i, like), inverse_mass(motion, j, like)
-        push = compose(n, p_n, p_t)
-        turn = scale(-problem.spin_factor, moment(n, p_t))
-        store(motion, i, axpy(-m_i, push, load(motion, i, like)))
-        store(motion, j, axpy(m_j, push, load(motion, j, like)))
-        store_spin(motion, i, axpy(m_i, turn, spin(motion, i, like)), like)
-        store_spin(motion, j, axpy(m_j, turn, spin(motion, j, like)), like)
-        if problem.coupled:
-            add_outer(rate, problem.weight, push, scale(problem.length[c], n))
-        else:
-            dilation += problem.dilation_weight * problem.length[c] * p_n
-    if not problem.coupled:
-        for k in range(len(like)):
-            rate[k, k] += dilation
+@inlined
+def _defect(values, one, two, bodies, base, place, law, dilation, rate, weight, like):
+    """Squared distance from the law, |P|² and ũ_n of one contact (or eight)."""
+    numbers = like_numbers(like)
+    at = places(numbers)
+    body_i = take_body(bodies, one, place, numbers)
+    body_j = take_body(bodies, two, place, numbers)
+    n = take_vector(values, base, at.normal, numbers)
+    length = take(values, base, at.length, numbers)
+    p_n = take(values, base, at.impulse_n, numbers)
+    p_t = take_tangent(values, base, at.impulse_t, numbers)
+    u_n, u_t = _velocity(body_i, body_j, n, length, law, dilation, rate)
+    u_n = u_n + (take(values, base, at.offset_n, numbers) + law.softness * p_n)
+    u_t = add(u_t, take_tangent(values, base, at.offset_t, numbers))
+    u_t = axpy(law.softness, p_t, u_t)
+    w_n = inverse_mass_of(body_i) + inverse_mass_of(body_j)
+    if law.coupled:
+        w_n = w_n + cell_weight(weight, n, length)[0]
+    else:
+        w_n = w_n + length * length * law.dilation_weight
+    mu = take(values, base, at.mu, numbers)
+    far = cone_defect(p_n, p_t, u_n, u_t, 1.0 / max(w_n, 1e-300), mu)
+    return far, p_n * p_n + norm2(p_t), u_n

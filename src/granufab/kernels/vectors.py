@@ -16,13 +16,11 @@ from typing import Any
 
 from numba.extending import overload
 
-from granufab.kernels.options import ARITHMETIC
+from granufab.kernels.options import INLINED
 
 __all__ = [
     "add",
-    "add_outer",
     "axpy",
-    "cell_weight",
     "compose",
     "dot",
     "inverse_mass",
@@ -33,6 +31,7 @@ __all__ = [
     "norm",
     "norm2",
     "scale",
+    "shorten",
     "slip",
     "spin",
     "store",
@@ -41,7 +40,7 @@ __all__ = [
     "tangential",
 ]
 
-_OPTIONS: dict[str, Any] = {"jit_options": ARITHMETIC}
+_OPTIONS: dict[str, Any] = {"jit_options": INLINED}
 
 
 def _choose(vector: Any, two: Any, three: Any, one: Any = None) -> Any:
@@ -332,58 +331,13 @@ def _matvec(matrix, a):
     )
 
 
-def add_outer(target, weight, a, b):
-    """target += weight ∘ (a⊗b) for matrices (D, D): a contact's push on the free cell rates."""
-    for k in range(len(a)):
-        for l in range(len(b)):
-            target[k, l] += weight[k, l] * a[k] * b[l]
+def shorten(a, longest):
+    """A tangential vector, cut to a length."""
+    return scale(min(1.0, longest / max(norm(a), 1e-300)), a)
 
 
-@overload(add_outer, **_OPTIONS)
-def _add_outer(target, weight, a, b):
-    def two(target, weight, a, b):
-        target[0, 0] += weight[0, 0] * a[0] * b[0]
-        target[0, 1] += weight[0, 1] * a[0] * b[1]
-        target[1, 0] += weight[1, 0] * a[1] * b[0]
-        target[1, 1] += weight[1, 1] * a[1] * b[1]
-
-    def three(target, weight, a, b):
-        for k in range(3):
-            row = a[0] if k == 0 else (a[1] if k == 1 else a[2])
-            target[k, 0] += weight[k, 0] * row * b[0]
-            target[k, 1] += weight[k, 1] * row * b[1]
-            target[k, 2] += weight[k, 2] * row * b[2]
-
-    return _choose(a, two, three)
-
-
-def cell_weight(weight, n, length):
-    """What free cell components add to the local Delassus matrix, as (nn, nt, tt).
-
-    The addition is diag(s_k) in global axes, s_k = Σ_l weight_kl ℓ_l². In 3D nt is 0 and tt an
-    upper bound (the largest s_k): the coupling is O(1/grain_count) and left to the sweeps.
-    """
-    s = [length**2 * sum(weight[k, l] * n[l] ** 2 for l in range(len(n))) for k in range(len(n))]
-    normal = sum(n[k] ** 2 * s[k] for k in range(len(n)))
-    if len(n) == 2:
-        return normal, n[0] * n[1] * (s[1] - s[0]), n[1] ** 2 * s[0] + n[0] ** 2 * s[1]
-    return normal, 0.0, max(s)
-
-
-@overload(cell_weight, **_OPTIONS)
-def _cell_weight(weight, n, length):
-    def two(weight, n, length):
-        x = length * length * n[0] * n[0]
-        y = length * length * n[1] * n[1]
-        s_0 = weight[0, 0] * x + weight[0, 1] * y
-        s_1 = weight[1, 0] * x + weight[1, 1] * y
-        xx = n[0] * n[0]
-        yy = n[1] * n[1]
-        return xx * s_0 + yy * s_1, n[0] * n[1] * (s_1 - s_0), yy * s_0 + xx * s_1
-
-    def three(weight, n, length):
-        squared = (n[0] * n[0], n[1] * n[1], n[2] * n[2])
-        s = scale(length * length, matvec(weight, squared))
-        return dot(squared, s), 0.0, max(s[0], max(s[1], s[2]))
-
-    return _choose(n, two, three)
+@overload(shorten, **_OPTIONS)
+def _shorten(a, longest):
+    if a.count == 1:
+        return lambda a, longest: (min(max(a[0], -1.0 * longest), longest),)
+    return lambda a, longest: scale(min(1.0, longest / max(norm(a), 1e-300)), a)

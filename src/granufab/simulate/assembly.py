@@ -11,7 +11,7 @@ from granufab.kernels.problem import Problem
 from granufab.packing import Array, IntArray
 from granufab.simulate.candidates import Candidates
 
-__all__ = ["Buffers", "StepLaw", "assemble", "impulse_copies"]
+__all__ = ["Buffers", "StepLaw", "assemble", "impulses"]
 
 
 class Buffers(NamedTuple):
@@ -23,8 +23,6 @@ class Buffers(NamedTuple):
     offset_t: Array
     impulse_n: Array
     impulse_t: Array
-    before_n: Array
-    before_t: Array
 
     @classmethod
     def of(cls, count: int, dimension: int) -> Self:
@@ -33,7 +31,7 @@ class Buffers(NamedTuple):
         line, plane = (lambda: np.empty(count)), (lambda: np.empty((count, tangents)))
         return cls(
             np.empty((count, dimension)),
-            line(), line(), plane(), line(), plane(), line(), plane(),
+            line(), line(), plane(), line(), plane(),
         )  # fmt: skip
 
 
@@ -115,11 +113,6 @@ def assemble(
     return problem, chosen
 
 
-def impulse_copies(buffers: Buffers, count: int) -> tuple[Array, Array, Array, Array]:
-    """(P_n, P_t) of the active contacts and scratch for the iterate before."""
-    return (
-        buffers.impulse_n[:count],
-        buffers.impulse_t[:count],
-        buffers.before_n[:count],
-        buffers.before_t[:count],
-    )
+def impulses(buffers: Buffers, count: int) -> tuple[Array, Array]:
+    """(P_n, P_t) of the active contacts."""
+    return buffers.impulse_n[:count], buffers.impulse_t[:count]

@@ -5,17 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from granufab.kernels.motion import measure_gaps, turn_tangents
-from granufab.kernels.neighbours import conflict_free_order, find_pairs, find_wall_pairs
+from granufab.kernels.neighbours import find_pairs, find_wall_pairs
 from granufab.packing import Array, Contacts, IntArray, WallContacts
 
 __all__ = ["Candidates"]
 
-BATCH, WINDOW = 16, 128
 IMAGE_SPAN = 64
 
 
 class Candidates:
-    """Pairs within the skin, in sweep order, with the impulses carried from step to step.
+    """Pairs within the skin, with the impulses carried from step to step.
 
     A private mutable record of the engine. Pairs are keyed by (i, j, image), so impulses survive
     a new search; a wall w is body grain_count + w with image 0.
@@ -64,7 +63,7 @@ class Candidates:
         skin: float,
         friction: tuple[float, float],
     ) -> None:
-        """Find all pairs within ``skin`` [m], keep known impulses, choose the sweep order.
+        """Find all pairs within ``skin`` [m], keep known impulses.
 
         Args:
             position: centres [m].
@@ -94,10 +93,7 @@ class Candidates:
             pairs = np.concatenate([pairs, walls])
             images = np.concatenate([images, np.zeros((touching, self.dimension), np.int32)])
         old_keys, old_n, old_t = self.keys(), self.impulse_n, self.impulse_t
-        order = conflict_free_order(
-            pairs[:, 0], pairs[:, 1], len(radius) + 2 * self.dimension, BATCH, WINDOW
-        )
-        self._allocate(pairs[order], images[order])
+        self._allocate(pairs, images)
         self.friction[:] = friction[0]
         self.friction[self.pairs[:, 1] >= self.grain_count] = friction[1]
         self._recall(old_keys, old_n, old_t)

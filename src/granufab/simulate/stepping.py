@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from granufab.errors import InvalidPacking, NotConverged
+from granufab.kernels.impulses import apply_impulses
 from granufab.kernels.motion import (
     accumulate_drift,
     drift,
@@ -21,13 +22,12 @@ from granufab.kernels.motion import (
 )
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.select import select_active
-from granufab.kernels.solve import solve
-from granufab.kernels.sweep import apply_impulses
 from granufab.packing import Array, IntArray, Packing, require
-from granufab.simulate.assembly import Buffers, StepLaw, assemble, impulse_copies
+from granufab.simulate.assembly import Buffers, StepLaw, assemble, impulses
 from granufab.simulate.bodies import body_records
 from granufab.simulate.candidates import Candidates
 from granufab.simulate.cell_motion import matrix_exponential, shorten_cell
+from granufab.simulate.contact_solver import ContactSolver, Solution
 from granufab.simulate.loading import Loading
 from granufab.simulate.scales import Scales
 from granufab.simulate.settings import Material, Solver
@@ -108,7 +108,8 @@ class Simulation:
         self.like = (0.0,) * self.dimension
         self.spin_factor = (2.0 if self.dimension == 2 else 2.5) if rotation else 0.0
         self.motion = body_records(packing)
-        self.free_motion, self._before_motion = self.motion.copy(), self.motion.copy()
+        self.free_motion = self.motion.copy()
+        self.contact_solver = ContactSolver(self.grain_count, self.dimension)
         self.walked = np.zeros((self.grain_count, self.dimension))
         self.strain_walked = 0.0
         self.candidates = Candidates(self.grain_count, self.dimension)
@@ -237,6 +238,7 @@ class Simulation:
         cell = (self.matrix, self.origin, self.periodic)
         friction = (self.material.friction, self.material.wall_friction)
         self.candidates.search(self.position, self.radius, cell, self._skin, friction)
+        self.contact_solver.arrange(self.position, self.matrix, self.origin)
         self.walked[:] = 0.0
         self.strain_walked = 0.0
         self._farthest = 0.0
@@ -286,9 +288,9 @@ class Simulation:
             problem, chosen = assemble(
                 self.candidates, self._buffers, law, (self._start_motion(), rate_before), self.like
             )
-            count, residual, share, violation = self._iterate(problem)
-            sweeps += count
-            self.contact_updates += count * len(chosen)
+            found = self._iterate(problem)
+            sweeps += found.sweeps
+            self.contact_updates += found.sweeps * len(chosen)
             self._store(problem, chosen)
             if self.material.restitution > 0 or resolves == RESOLVES or not self._missed():
                 break
@@ -296,11 +298,11 @@ class Simulation:
         overlap = max(0.0, -float(self.candidates.gap.min(initial=0.0))) / self.scales.diameter
         return StepReport(
             sweeps=sweeps,
-            residual=residual,
-            residual_contact=share,
-            violation=violation * self.step_size / self.scales.diameter,
+            residual=found.residual,
+            residual_contact=found.residual_contact,
+            violation=found.violation * self.step_size / self.scales.diameter,
             overlap=overlap,
-            converged=residual <= self.solver.tolerance,
+            converged=found.residual <= self.solver.tolerance,
             contacts=len(chosen),
             resolves=resolves,
         )
@@ -336,22 +338,19 @@ class Simulation:
         start[: self.grain_count, : self.dimension] -= self.step_size * self.gravity
         return start
 
-    def _iterate(self, problem: Problem) -> tuple[int, float, float, float]:
-        count = len(problem.length)
-        impulse_n, impulse_t, before_n, before_t = impulse_copies(self._buffers, count)
+    def _iterate(self, problem: Problem) -> Solution:
+        impulse_n, impulse_t = impulses(self._buffers, len(problem.length))
         self.motion[:] = self.free_motion
         state = State(self.motion, self.free_rate.copy(), impulse_n, impulse_t)
         apply_impulses(problem, state, self.like)
-        before = State(self._before_motion, np.empty_like(self.free_rate), before_n, before_t)
         cap = MOMENTUM_CAP if self.solver.momentum else 0.0
         floor = self.scales.force * self.step_size
-        lag = min(64, max(1, count // 50))
-        settings = (self.solver.tolerance, self.solver.max_sweeps, cap, floor, lag)
-        return solve(problem, state, before, self.like, settings)
+        settings = (self.solver.tolerance, self.solver.max_sweeps, cap, floor)
+        return self.contact_solver.solve(problem, state, settings)
 
     def _store(self, problem: Problem, chosen: IntArray) -> None:
         """Velocities afresh from the impulses (no drift of round-off), impulses to the list."""
-        impulse_n, impulse_t, _, _ = impulse_copies(self._buffers, len(chosen))
+        impulse_n, impulse_t = impulses(self._buffers, len(chosen))
         self.motion[:] = self.free_motion
         self.problem = problem
         self.state = State(self.motion, self.free_rate.copy(), impulse_n, impulse_t)

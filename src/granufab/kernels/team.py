@@ -1,0 +1,79 @@
+"""Threads that solve one step together: atomic counters and a barrier.
+
+Every member runs the same kernel without the interpreter lock and knows its number; they meet at
+barriers. A member that waits long gives its processor away, so more members than processors are
+slow, not stuck.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from granufab.kernels.options import kernel
+
+__all__ = ["COUNTERS", "meet"]
+
+COUNTERS = 32
+"""Length of the array of counters (int64) that a team shares; the used ones lie far apart."""
+
+ARRIVED, ROUND = 0, 16
+PATIENCE = 2000
+
+
+def _counter(context: Any, builder: Any, kind: Any, array: Any, place: Any) -> Any:
+    return builder.gep(context.make_array(kind)(context, builder, array).data, [place])
+
+
+@intrinsic
+def _read(typing_context, array, place):
+    def code(context, builder, signature, values):
+        pointer = _counter(context, builder, signature.args[0], *values)
+        return builder.load_atomic(pointer, "seq_cst", 8)
+
+    return types.int64(array, place), code
+
+
+@intrinsic
+def _write(typing_context, array, place, value):
+    def code(context, builder, signature, values):
+        pointer = _counter(context, builder, signature.args[0], *values[:2])
+        builder.store_atomic(values[2], pointer, "seq_cst", 8)
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, types.int64), code
+
+
+@intrinsic
+def _increase(typing_context, array, place):
+    """Add one; returns the value before."""
+
+    def code(context, builder, signature, values):
+        pointer = _counter(context, builder, signature.args[0], *values)
+        one = ir.Constant(ir.IntType(64), 1)
+        return builder.atomic_rmw("add", pointer, one, "seq_cst")
+
+    return types.int64(array, place), code
+
+
+_yield_processor = types.ExternalFunction("sched_yield", types.int32())
+
+
+@kernel
+def meet(counters, members):
+    """Wait until all members are here; what each wrote before is seen by all after."""
+    if members == 1:
+        return
+    now = _read(counters, ROUND)
+    if _increase(counters, ARRIVED) == members - 1:
+        _write(counters, ARRIVED, 0)
+        _increase(counters, ROUND)
+        return
+    waited = 0
+    while _read(counters, ROUND) == now:
+        waited += 1
+        if waited > PATIENCE:
+            _yield_processor()
