@@ -3,7 +3,7 @@
 Both bodies are loaded into locals, the contact is solved exactly, the change is stored: a local
 Signorini–Coulomb problem per contact (``contact_law``). The text is the same for one contact and
 for a batch of eight that share no body. The cell's free rates are one more body; their change is
-handed on every ``LAG`` contacts, which frees the sweep of a serial dependency.
+handed on every 64 contacts, which frees the sweep of a serial dependency.
 
 Chunks of contacts may be swept side by side: each then takes the cell to move as if the others
 pushed it alike (its own push times the number of chunks); the sum of the true pushes is applied
@@ -54,7 +54,7 @@ from granufab.kernels.vectors import (
 
 __all__ = ["Law", "defects", "sweep"]
 
-LAG = 64
+LAG, LAGS = 64, 50  # the cell is moved after 64 contacts, and at least 50 times a sweep
 
 
 class Law(NamedTuple):
@@ -107,7 +107,8 @@ def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     flow, pushes = address(rate), address(scratch)
     dilation, pushed, pending = rate[0, 0], 0.0, 0.0
     moved, length2 = 0.0, 0.0
-    until = LAG // WIDTH
+    lag = max(1, min(LAG // WIDTH, slots.starts[-1] // LAGS))
+    until = lag
     for batch in range(start, end):
         for lane in range(0, WIDTH, stride(like)):
             base, place = batch * size + lane, batch * WIDTH + lane
@@ -120,7 +121,7 @@ def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
             pending += turn
         until -= 1
         if until == 0:
-            until = LAG // WIDTH
+            until = lag
             if law.coupled:
                 hand_on(rate, push, scratch, together)
             dilation += together * pending
