@@ -124,8 +124,8 @@ def curve(rows: list[Result]) -> str:
     """Cost of an update against size."""
     names = ("grains", "contacts", "kernel", "ns")
     return table(
-        ("", "grains", "contacts", "kernel", "ns per update"),
-        ([f"{r['dimension']}D", *(r[name] for name in names)] for r in rows),
+        ("", "grains", "contacts", "kernel", "ns per update", "over the first"),
+        ([f"{r['dimension']}D", *(r[n] for n in names), ratio(r["relative"])] for r in rows),
     )
 
 

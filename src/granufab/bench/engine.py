@@ -7,17 +7,27 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from granufab.kernels.options import kernel
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.sweep import sweep
-from granufab.packing import Packing
+from granufab.packing import Array, Packing
 from granufab.simulate import Loading, Material, Simulation, Solver
 
-__all__ = ["Case", "Kernel", "Marching", "StepCost", "copy_of", "problem_of", "sweep_seconds"]
+__all__ = [
+    "Case",
+    "Kernel",
+    "Marching",
+    "StepCost",
+    "Streams",
+    "copy_of",
+    "problem_of",
+    "streams_of",
+    "sweep_seconds",
+]
 
 Kernel = Literal["scalar", "fast"]
 LAG = 64
@@ -47,6 +57,68 @@ class Case:
     def contact_count(self) -> int:
         """Contacts in the solve."""
         return len(self.problem.length)
+
+
+class Streams(NamedTuple):
+    """A case as plain arrays in solve order, whatever the engine's own layout: for the reference.
+
+    Attributes:
+        contact_count, lag: contacts, and contacts between two updates of the dilation.
+        first, second: bodies, int32, shape (contact_count,).
+        normal: shape (contact_count, D).
+        length, offset_n: shape (contact_count,); offset_t: shape (contact_count, 1 or 3).
+        mu: shape (contact_count,).
+        eps, kappa, w_cell: 1/(k h²), m R²/I, 1/(D M).
+        motion: body records, shape (body_count, 4 or 8); changed by a sweep.
+        impulse_n, impulse_t: shapes (contact_count,), (contact_count, 1 or 3); changed by a sweep.
+        dilation: shape (1,); changed by a sweep.
+    """
+
+    contact_count: int
+    lag: int
+    first: np.ndarray
+    second: np.ndarray
+    normal: Array
+    length: Array
+    offset_n: Array
+    offset_t: Array
+    mu: Array
+    eps: float
+    kappa: float
+    w_cell: float
+    motion: Array
+    impulse_n: Array
+    impulse_t: Array
+    dilation: Array
+
+
+def streams_of(case: Case) -> Streams:
+    """Copies of a case's arrays as :class:`Streams`.
+
+    Raises:
+        ValueError: the cell has free components other than the dilation.
+    """
+    p, s = case.problem, case.state
+    if p.coupled:
+        raise ValueError("the reference sweeps problems whose only free component is the dilation")
+    return Streams(
+        contact_count=case.contact_count,
+        lag=case.lag,
+        first=np.array(p.first, dtype=np.int32),
+        second=np.array(p.second, dtype=np.int32),
+        normal=np.array(p.normal),
+        length=np.array(p.length),
+        offset_n=np.array(p.offset_n),
+        offset_t=np.array(p.offset_t),
+        mu=np.array(p.mu),
+        eps=p.softness,
+        kappa=p.spin_factor,
+        w_cell=p.dilation_weight,
+        motion=np.array(s.motion),
+        impulse_n=np.array(s.impulse_n),
+        impulse_t=np.array(s.impulse_t),
+        dilation=np.array(s.rate[:1, 0]),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from granufab.bench.engine import Case, Kernel, copy_of, problem_of, sweep_seconds
+from granufab.bench.engine import Case, Kernel, copy_of, problem_of, streams_of, sweep_seconds
 from granufab.bench.problems import FRICTION, isotropic_state
 from granufab.bench.reference import Reference
 from granufab.bench.side_by_side import Timing, ratio_of, take_turns
 from granufab.simulate import Isotropic
 
-__all__ = ["UPDATES", "isotropic_case", "kernel_speed", "thread_speed", "update_cost"]
+__all__ = [
+    "UPDATES",
+    "best_kernel",
+    "has_threads",
+    "isotropic_case",
+    "kernel_speed",
+    "thread_speed",
+    "update_costs",
+]
 
 UPDATES = 2_500_000
 """Contact updates of one timing: some tens of milliseconds."""
@@ -42,9 +51,11 @@ def kernel_speed(
         return partial(sweep_seconds, copy_of(case), sweeps, kernel=kernel)
 
     def theirs() -> float | None:
-        return None if reference is None else reference.sweep(yardstick, sweeps)
+        if reference is None or yardstick is None:
+            return None
+        return reference.sweep(yardstick, sweeps)
 
-    yardstick = copy_of(case)
+    yardstick = None if reference is None else streams_of(case)
     scalar, fast, plain = take_turns([ours("scalar"), ours("fast"), theirs], repetitions)
     return {
         "dimension": case.dimension,
@@ -62,8 +73,12 @@ def kernel_speed(
 
 
 def _nanoseconds(seconds: list[float | None], updates: int) -> float | None:
-    known = [value for value in seconds if value is not None]
-    return 1e9 * float(np.median(known)) / updates if known else None
+    return _median([None if value is None else 1e9 * value / updates for value in seconds])
+
+
+def _median(values: list[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.median(known)) if known else None
 
 
 def best_kernel(case: Case) -> Kernel:
@@ -96,17 +111,34 @@ def thread_speed(case: Case, *, repetitions: int, updates: int = UPDATES) -> dic
     }
 
 
-def update_cost(case: Case, *, repetitions: int, updates: int = UPDATES) -> dict[str, Any]:
-    """ns per contact update of the best kernel on one thread."""
-    kernel = best_kernel(case)
-    sweeps = max(1, updates // case.contact_count)
-    (seconds,) = take_turns(
-        [partial(sweep_seconds, copy_of(case), sweeps, kernel=kernel)], repetitions
+def update_costs(
+    cases: Sequence[Case], *, repetitions: int, updates: int = UPDATES
+) -> list[dict[str, Any]]:
+    """ns per contact update of the best kernel on one thread, all cases in turn.
+
+    ``relative`` is a case's cost over the first one's, pair by pair.
+    """
+    kernel = best_kernel(cases[0])
+    sweeps = [max(1, updates // case.contact_count) for case in cases]
+    columns = take_turns(
+        [
+            partial(sweep_seconds, copy_of(case), count, kernel=kernel)
+            for case, count in zip(cases, sweeps, strict=True)
+        ],
+        repetitions,
     )
-    return {
-        "dimension": case.dimension,
-        "grains": case.grain_count,
-        "contacts": case.contact_count,
-        "kernel": kernel,
-        "ns": _nanoseconds(seconds, sweeps * case.contact_count),
-    }
+    costs = [
+        [None if t is None else 1e9 * t / (count * case.contact_count) for t in column]
+        for column, count, case in zip(columns, sweeps, cases, strict=True)
+    ]
+    return [
+        {
+            "dimension": case.dimension,
+            "grains": case.grain_count,
+            "contacts": case.contact_count,
+            "kernel": kernel,
+            "ns": _median(cost),
+            "relative": ratio_of(cost, costs[0]),
+        }
+        for case, cost in zip(cases, costs, strict=True)
+    ]

@@ -196,6 +196,7 @@ def biaxial_loading(packing: Packing) -> Loading:
     return Biaxial(axial_rate=rate / 2)
 
 
+@cache
 def sheared_state(
     grain_count: int,
     *,

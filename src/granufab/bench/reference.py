@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from granufab.bench.engine import Case
+from granufab.bench.engine import Streams
 
 __all__ = ["COMPILERS", "Reference", "reference"]
 
@@ -28,7 +28,7 @@ COMPILE_SECONDS = 120
 
 
 class _Problem(ctypes.Structure):
-    """Mirrors ``struct Problem`` of ``reference.cpp``."""
+    """Mirrors ``struct Problem`` of ``reference.cpp`` and :class:`Streams`, field by field."""
 
     _fields_ = [
         ("count", ctypes.c_int64),
@@ -54,32 +54,14 @@ class Reference:
     compiler: str
     flags: tuple[str, ...]
 
-    def sweep(self, case: Case, sweeps: int) -> float:
-        """Make ``sweeps`` sweeps of a case in place; returns the seconds they took."""
-        problem, keep = _problem(case)
-        function = self.library.sweep_2d if case.dimension == 2 else self.library.sweep_3d
+    def sweep(self, streams: Streams, sweeps: int) -> float:
+        """Make ``sweeps`` sweeps in place; returns the seconds they took."""
+        problem = _Problem(*(x.ctypes.data if isinstance(x, np.ndarray) else x for x in streams))
+        disks = streams.normal.shape[1] == 2
+        function = self.library.sweep_2d if disks else self.library.sweep_3d
         began = time.perf_counter()
         function(ctypes.byref(problem), ctypes.c_int64(sweeps))
-        seconds = time.perf_counter() - began
-        np.fill_diagonal(case.state.rate, keep[-1])
-        return seconds
-
-
-def _problem(case: Case) -> tuple[_Problem, list[np.ndarray]]:
-    """The case as the reference reads it, and the arrays that must outlive the call."""
-    p, s = case.problem, case.state
-    if p.coupled:
-        raise ValueError("the reference sweeps problems whose only free component is the dilation")
-    bodies = [np.ascontiguousarray(index, dtype=np.int32) for index in (p.first, p.second)]
-    streams = [p.normal, p.length, p.offset_n, p.offset_t, p.mu]
-    changed = [s.motion, s.impulse_n, s.impulse_t, np.array([s.rate[0, 0]])]
-    arrays = [*bodies, *streams, *changed]
-    if not all(array.flags.c_contiguous for array in arrays):
-        raise ValueError("the reference reads contiguous arrays")
-    address = [array.ctypes.data for array in arrays]
-    numbers = (p.softness, p.spin_factor, p.dilation_weight)
-    count = len(p.length)
-    return _Problem(count, case.lag, *address[:7], *numbers, *address[7:]), arrays
+        return time.perf_counter() - began
 
 
 @cache
