@@ -52,9 +52,11 @@ def test_a_plain_step_stopped_by_its_cap_counts_at_the_cap(packed: Packing) -> N
     assert row["plain"]["sweeps_mean"] == 3
 
 
-def test_the_stages_of_a_step_make_up_its_time(packed: Packing) -> None:
+def test_the_stages_of_a_step_fit_into_its_time(packed: Packing) -> None:
     loading = Isotropic(dimension=packed.dimension)
     row = profile_steps(packed, loading, friction=0.3, tolerance=1e-4, steps=3)
-    stages = sum(row["ms_by_stage"].values())
-    assert stages == pytest.approx(row["ms_per_step"], rel=0.2)
+    stages = row["ms_by_stage"]
+    assert set(stages) == {"sweeps", "rest of the solve", "search", "geometry", "rest"}
+    assert min(stages.values()) >= 0
+    assert sum(stages.values()) <= row["ms_per_step"] * (1 + 1e-9)
     assert 0 < row["outside_sweeps_fraction"] < 1
