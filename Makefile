@@ -1,4 +1,5 @@
 PYTHON ?= python
+BENCH_OUT ?= build/benchmarks
 
 .PHONY: check test slow bench docs format
 
@@ -15,7 +16,7 @@ slow:
 	$(PYTHON) -m pytest -m slow
 
 bench:
-	$(PYTHON) benchmarks/timing.py --full
+	$(PYTHON) benchmarks/suite.py $(BENCH_OUT)
 
 docs:
 	$(PYTHON) docs/write_api.py

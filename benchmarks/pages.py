@@ -1,6 +1,6 @@
 """Write the measured tables into the documentation pages, between markers.
 
-python benchmarks/pages.py convergence|peers|critical|triaxial OUT
+python benchmarks/pages.py convergence|peers|critical|triaxial|benchmarks OUT
 """
 
 from __future__ import annotations
@@ -140,8 +140,19 @@ def convergence(folder: Path) -> None:
     insert("convergence.md", "convergence", write(folder, DOCS))
 
 
+def benchmarks(folder: Path) -> None:
+    """Tables of the long benchmark."""
+    from benchmarks_page import tables
+
+    data = json.loads((folder / "benchmarks.json").read_text())
+    (DOCS / "benchmarks.json").write_text(json.dumps(data, indent=1) + "\n")
+    for name, text in tables(data).items():
+        insert("benchmarks.md", name, text)
+
+
 if __name__ == "__main__":
     pages = {
         "peers": peers, "critical": critical, "convergence": convergence, "triaxial": triaxial,
+        "benchmarks": benchmarks,
     }  # fmt: skip
     pages[sys.argv[1]](Path(sys.argv[2]))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-VERBS = ["new", "run", "reproduce", "measure", "fit", "plot", "info", "doctor"]
+VERBS = ["new", "run", "reproduce", "measure", "fit", "plot", "info", "doctor", "bench"]
 
 
 def one_line(done, *words: str) -> None:

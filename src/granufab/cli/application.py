@@ -8,6 +8,7 @@ import typer
 
 from granufab.cli import (
     balance,
+    bench,
     criterion,
     doctor,
     fit,
@@ -41,6 +42,7 @@ app.command("predict")(predict.predict)
 app.command("plot")(plot.plot)
 app.command("info")(info.info)
 app.command("doctor")(doctor.doctor)
+app.command("bench")(bench.bench)
 
 
 def _print_version(wanted: bool) -> None:
