@@ -11,11 +11,14 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from granufab.kernels.lanes import WIDTH
 from granufab.kernels.options import kernel
 from granufab.kernels.problem import Problem, State
-from granufab.kernels.sweep import sweep
+from granufab.kernels.slots import places, unpack
+from granufab.kernels.sweep import lag_of, sweep
 from granufab.packing import Array, Packing
 from granufab.simulate import Loading, Material, Simulation, Solver
+from granufab.simulate.contact_solver import ContactSolver, Solution, wide_by_default
 
 __all__ = [
     "Case",
@@ -30,7 +33,6 @@ __all__ = [
 ]
 
 Kernel = Literal["scalar", "fast"]
-LAG = 64
 NO_SWEEPS = 0.99
 
 
@@ -42,7 +44,6 @@ class Case:
         problem, state: as the kernels take them.
         dimension: 2 or 3.
         grain_count: bodies without walls.
-        lag: contacts between two updates of the cell's free rate.
         residual: of the warm start [-].
     """
 
@@ -50,7 +51,6 @@ class Case:
     state: State
     dimension: int
     grain_count: int
-    lag: int
     residual: float
 
     @property
@@ -62,12 +62,14 @@ class Case:
 class Streams(NamedTuple):
     """A case as plain arrays in solve order, whatever the engine's own layout: for the reference.
 
+    The empty places of the engine's batches are contacts of a spare body that stay open.
+
     Attributes:
         contact_count, lag: contacts, and contacts between two updates of the dilation.
         first, second: bodies, int32, shape (contact_count,).
         normal: shape (contact_count, D).
         length, offset_n: shape (contact_count,); offset_t: shape (contact_count, 1 or 3).
-        mu: shape (contact_count,).
+        mu, inverse_n, inverse_t: friction, 1/(W_nn + ε), 1/(W_tt + ε), shape (contact_count,).
         eps, kappa, w_cell: 1/(k h²), m R²/I, 1/(D M).
         motion: body records, shape (body_count, 4 or 8); changed by a sweep.
         impulse_n, impulse_t: shapes (contact_count,), (contact_count, 1 or 3); changed by a sweep.
@@ -83,6 +85,8 @@ class Streams(NamedTuple):
     offset_n: Array
     offset_t: Array
     mu: Array
+    inverse_n: Array
+    inverse_t: Array
     eps: float
     kappa: float
     w_cell: float
@@ -93,32 +97,54 @@ class Streams(NamedTuple):
 
 
 def streams_of(case: Case) -> Streams:
-    """Copies of a case's arrays as :class:`Streams`.
+    """A case as :class:`Streams`.
 
     Raises:
         ValueError: the cell has free components other than the dilation.
     """
-    p, s = case.problem, case.state
+    p, like = case.problem, (0.0,) * case.dimension
     if p.coupled:
         raise ValueError("the reference sweeps problems whose only free component is the dilation")
+    packed = _solver(case).pack(p, case.state)
+    batches = int(packed.slots.starts[-1])
+    table = packed.slots.values[: batches * packed.size].reshape(batches, -1, WIDTH)
+    at = places(like)
+
+    def line(field: int) -> Array:
+        return table[:, field].ravel()
+
+    def columns(field: int, count: int) -> Array:
+        return np.stack([line(field + k) for k in range(count)], axis=1)
+
+    tangents = p.offset_t.shape[1]
     return Streams(
-        contact_count=case.contact_count,
-        lag=case.lag,
-        first=np.array(p.first, dtype=np.int32),
-        second=np.array(p.second, dtype=np.int32),
-        normal=np.array(p.normal),
-        length=np.array(p.length),
-        offset_n=np.array(p.offset_n),
-        offset_t=np.array(p.offset_t),
-        mu=np.array(p.mu),
+        contact_count=batches * WIDTH,
+        lag=WIDTH * lag_of(batches),
+        first=packed.slots.first[: batches * WIDTH].astype(np.int32),
+        second=packed.slots.second[: batches * WIDTH].astype(np.int32),
+        normal=columns(at.normal, case.dimension),
+        length=line(at.length),
+        offset_n=line(at.offset_n),
+        offset_t=columns(at.offset_t, tangents),
+        mu=line(at.mu),
+        inverse_n=line(at.inverse_n),
+        inverse_t=line(at.inverse_t),
         eps=p.softness,
         kappa=p.spin_factor,
         w_cell=p.dilation_weight,
-        motion=np.array(s.motion),
-        impulse_n=np.array(s.impulse_n),
-        impulse_t=np.array(s.impulse_t),
-        dilation=np.array(s.rate[:1, 0]),
+        motion=np.array(case.state.motion),
+        impulse_n=line(at.impulse_n),
+        impulse_t=columns(at.impulse_t, tangents),
+        dilation=np.array(case.state.rate[:1, 0]),
     )
+
+
+def _solver(case: Case, threads: int | None = None, *, wide: bool = False) -> ContactSolver:
+    """Solver of a case; in one chunk unless a team takes it."""
+    solver = ContactSolver(case.grain_count, case.dimension, threads=threads or 1, wide=wide)
+    if threads is None:
+        solver.divide(1)
+    return solver
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,7 +182,6 @@ def problem_of(packing: Packing, loading: Loading, *, friction: float) -> Case:
         state=_copied(simulation.state),
         dimension=simulation.dimension,
         grain_count=simulation.grain_count,
-        lag=min(LAG, max(1, report.contacts // 50)),
         residual=report.residual,
     )
 
@@ -172,32 +197,47 @@ def _copied(record):
 
 
 @kernel
-def _make_sweeps(problem, state, like, lag, count):
+def _make_sweeps(slots, bodies, law, cell, like, size, count):
     moved = 0.0
     for _ in range(count):
-        moved = sweep(problem, state, like, lag)
+        cell[1:] = 0.0
+        moved, _length2 = sweep(
+            slots, bodies, law, (0, slots.starts[-1], 0.0, 1.0), cell, like, size
+        )
     return moved
 
 
 def sweep_seconds(
-    case: Case, sweeps: int, *, kernel: Kernel = "scalar", threads: int = 1
+    case: Case, sweeps: int, *, kernel: Kernel = "scalar", threads: int | None = None
 ) -> float | None:
     """Make ``sweeps`` plain sweeps of a case in place.
 
     Args:
         case: changed by the sweeps.
         sweeps: how many.
-        kernel: the readable law (scalar) or the vectorised one (fast).
-        threads: how many share a sweep.
+        kernel: one contact at a time (scalar) or eight (fast).
+        threads: members of a team, with all that a team does besides; None: the bare sweep.
     Returns:
         The seconds they took; None where the engine has no such kernel or threads.
     """
-    if kernel != "scalar" or threads != 1:
+    if kernel == "fast" and not wide_by_default():
         return None
-    like = (0.0,) * case.dimension
+    solver = _solver(case, threads, wide=kernel == "fast")
+    if threads is not None and solver.threads < threads:
+        return None
+    packed, state = solver.pack(case.problem, case.state), case.state
     began = time.perf_counter()
-    _make_sweeps(case.problem, case.state, like, case.lag, sweeps)
-    return time.perf_counter() - began
+    if threads is None:
+        cell = np.zeros((3, case.dimension, case.dimension))
+        cell[0] = state.rate
+        like = (solver.like,) if solver.wide else solver.like
+        _make_sweeps(packed.slots, state.motion, packed.law, cell, like, packed.size, sweeps)
+        state.rate[:] = cell[0]
+    else:
+        solver.iterate(packed, state, (-1.0, sweeps, 0.0, 1.0))
+    seconds = time.perf_counter() - began
+    unpack(packed.slots, packed.size, packed.order, state.impulse_n, state.impulse_t, solver.like)
+    return seconds
 
 
 class _Timed(Simulation):
@@ -205,7 +245,7 @@ class _Timed(Simulation):
 
     sweeping = 0.0
 
-    def _iterate(self, problem: Problem) -> tuple[int, float, float, float]:
+    def _iterate(self, problem: Problem) -> Solution:
         began = time.perf_counter()
         found = super()._iterate(problem)
         self.sweeping += time.perf_counter() - began

@@ -23,6 +23,8 @@ struct Problem {
     const double* offset_n;        // velocity offsets
     const double* offset_t;        // 1 or 3 columns
     const double* mu;              // friction
+    const double* inverse_n;       // 1/(W_nn + eps), the cell's share included
+    const double* inverse_t;       // 1/(W_tt + eps)
     double eps;                    // 1/(k h²)
     double kappa;                  // m R²/I
     double w_cell;                 // 1/(D M) of the dilation
@@ -66,15 +68,13 @@ double sweep_disks(const Problem& p) {
         const Disk i = body_i, j = body_j;
         const double nx = p.normal[2 * c], ny = p.normal[2 * c + 1], length = p.length[c];
         const double p_n = impulse_n[c], p_t = impulse_t[c];
-        const double ux = j.x - i.x, uy = j.y - i.y, mass = i.w + j.w;
+        const double ux = j.x - i.x, uy = j.y - i.y;
         const double u_n = nx * ux + ny * uy + p.offset_n[c] + eps * p_n + dilation * length;
         const double u_t = nx * uy - ny * ux - (i.spin + j.spin) + p.offset_t[c] + eps * p_t;
-        const double w_n = mass + eps + length * length * w_cell;
-        const double w_t = mass + kappa * mass + eps;
-        const double new_n = std::max(0.0, p_n - u_n / w_n);
-        const double stick = p_t - u_t / w_t;
-        const double share = std::min(1.0, p.mu[c] * new_n / std::max(std::fabs(stick), 1e-300));
-        const double new_t = share * stick;
+        const double new_n = std::max(0.0, p_n - u_n * p.inverse_n[c]);
+        const double stick = p_t - u_t * p.inverse_t[c];
+        const double most = p.mu[c] * new_n;
+        const double new_t = std::min(std::max(stick, -most), most);
         const double d_n = new_n - p_n, d_t = new_t - p_t;
         moved += d_n * d_n + d_t * d_t;
         impulse_n[c] = new_n;
@@ -112,15 +112,13 @@ double sweep_spheres(const Problem& p) {
         Sphere& body_j = bodies[p.second[c]];
         const Sphere i = body_i, j = body_j;
         const Vector n = normal[c], p_t = impulse_t[c];
-        const double length = p.length[c], p_n = impulse_n[c], mass = i.w + j.w;
+        const double length = p.length[c], p_n = impulse_n[c];
         const Vector u = j.v - i.v;
         const double along = dot(n, u);
         const Vector u_t = u - along * n - cross(i.s + j.s, n) + offset_t[c] + eps * p_t;
         const double u_n = along + p.offset_n[c] + eps * p_n + dilation * length;
-        const double w_n = mass + eps + length * length * w_cell;
-        const double w_t = mass + kappa * mass + eps;
-        const double new_n = std::max(0.0, p_n - u_n / w_n);
-        const Vector stick = p_t - (1.0 / w_t) * u_t;
+        const double new_n = std::max(0.0, p_n - u_n * p.inverse_n[c]);
+        const Vector stick = p_t - p.inverse_t[c] * u_t;
         const double size = std::max(std::sqrt(dot(stick, stick)), 1e-300);
         const double share = std::min(1.0, p.mu[c] * new_n / size);
         const Vector new_t = share * stick;

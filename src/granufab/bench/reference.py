@@ -34,7 +34,10 @@ class _Problem(ctypes.Structure):
         ("count", ctypes.c_int64),
         ("lag", ctypes.c_int64),
         *((name, ctypes.c_void_p) for name in ("first", "second", "normal", "length")),
-        *((name, ctypes.c_void_p) for name in ("offset_n", "offset_t", "mu")),
+        *(
+            (name, ctypes.c_void_p)
+            for name in ("offset_n", "offset_t", "mu", "inverse_n", "inverse_t")
+        ),
         *((name, ctypes.c_double) for name in ("eps", "kappa", "w_cell")),
         *((name, ctypes.c_void_p) for name in ("motion", "impulse_n", "impulse_t", "dilation")),
     ]

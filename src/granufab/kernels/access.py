@@ -7,11 +7,8 @@ tuple of D zeros, numbers or lanes, that the functions of ``vectors`` expect.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numba import types
-from numba.extending import overload
 
 from granufab.kernels.lanes import (
     LANES,
@@ -31,7 +28,7 @@ from granufab.kernels.lanes import (
     total,
     write_item,
 )
-from granufab.kernels.options import INLINED
+from granufab.kernels.options import compiled
 
 __all__ = [
     "address",
@@ -55,15 +52,13 @@ __all__ = [
     "velocity_of",
 ]
 
-_OPTIONS: dict[str, Any] = {"jit_options": INLINED}
-
 
 def like_numbers(like):
     """The tuple of D zeros, numbers or lanes."""
     return like
 
 
-@overload(like_numbers, **_OPTIONS)
+@compiled(like_numbers)
 def _like_numbers(like):
     if not isinstance(like[0], types.BaseTuple):
         return lambda like: like
@@ -77,7 +72,7 @@ def stride(like):
     return 1
 
 
-@overload(stride, **_OPTIONS)
+@compiled(stride)
 def _stride(like):
     width = WIDTH if isinstance(like[0], types.BaseTuple) else 1
     return lambda like: width
@@ -88,7 +83,7 @@ def address(array):
     return array.reshape(-1)
 
 
-@overload(address, **_OPTIONS)
+@compiled(address)
 def _address(array):
     return lambda array: address_of(array)
 
@@ -98,7 +93,7 @@ def item(place, k):
     return float(place[k])
 
 
-@overload(item, **_OPTIONS)
+@compiled(item)
 def _item(place, k):
     return lambda place, k: read_item(place, k)
 
@@ -108,7 +103,7 @@ def set_item(place, k, value):
     place[k] = value
 
 
-@overload(set_item, **_OPTIONS)
+@compiled(set_item)
 def _set_item(place, k, value):
     return lambda place, k, value: write_item(place, k, value)
 
@@ -118,7 +113,7 @@ def take(slots, at, field, like):
     return item(slots, at + WIDTH * field)
 
 
-@overload(take, **_OPTIONS)
+@compiled(take)
 def _take(slots, at, field, like):
     if like[0] == LANES:
         return lambda slots, at, field, like: load_lanes(slots, at + WIDTH * field)
@@ -130,7 +125,7 @@ def put(slots, at, field, value):
     slots[at + WIDTH * field] = value
 
 
-@overload(put, **_OPTIONS)
+@compiled(put)
 def _put(slots, at, field, value):
     if value == LANES:
         return lambda slots, at, field, value: store_lanes(slots, at + WIDTH * field, value)
@@ -142,7 +137,7 @@ def take_vector(slots, at, field, like):
     return tuple(float(slots[at + WIDTH * (field + k)]) for k in range(len(like)))
 
 
-@overload(take_vector, **_OPTIONS)
+@compiled(take_vector)
 def _take_vector(slots, at, field, like):
     if like.count == 2:
         return lambda slots, at, field, like: (
@@ -162,7 +157,7 @@ def take_tangent(slots, at, field, like):
     return tuple(float(slots[at + WIDTH * (field + k)]) for k in range(count))
 
 
-@overload(take_tangent, **_OPTIONS)
+@compiled(take_tangent)
 def _take_tangent(slots, at, field, like):
     if like.count == 2:
         return lambda slots, at, field, like: (take(slots, at, field, like),)
@@ -175,7 +170,7 @@ def put_tangent(slots, at, field, value):
         put(slots, at, field + k, x)
 
 
-@overload(put_tangent, **_OPTIONS)
+@compiled(put_tangent)
 def _put_tangent(slots, at, field, value):
     def one(slots, at, field, value):
         put(slots, at, field, value[0])
@@ -195,7 +190,7 @@ def take_body(bodies, index, place, like):
     return tuple(float(x) for x in bodies[first : first + width])
 
 
-@overload(take_body, **_OPTIONS)
+@compiled(take_body)
 def _take_body(bodies, index, place, like):
     if like[0] == LANES:
         if like.count == 2:
@@ -229,7 +224,7 @@ def put_body(bodies, index, place, body):
     bodies[first : first + len(body)] = body
 
 
-@overload(put_body, **_OPTIONS)
+@compiled(put_body)
 def _put_body(bodies, index, place, body):
     if body[0] == LANES:
         if body.count == 4:
@@ -259,7 +254,7 @@ def velocity_of(body):
     return body[:2] if len(body) == 4 else body[:3]
 
 
-@overload(velocity_of, **_OPTIONS)
+@compiled(velocity_of)
 def _velocity_of(body):
     if body.count == 4:
         return lambda body: (body[0], body[1])
@@ -271,7 +266,7 @@ def spin_of(body):
     return body[2:3] if len(body) == 4 else body[3:6]
 
 
-@overload(spin_of, **_OPTIONS)
+@compiled(spin_of)
 def _spin_of(body):
     if body.count == 4:
         return lambda body: (body[2],)
@@ -283,7 +278,7 @@ def inverse_mass_of(body):
     return body[3] if len(body) == 4 else body[6]
 
 
-@overload(inverse_mass_of, **_OPTIONS)
+@compiled(inverse_mass_of)
 def _inverse_mass_of(body):
     return (lambda body: body[3]) if body.count == 4 else (lambda body: body[6])
 
@@ -293,7 +288,7 @@ def body_of(v, s, body):
     return (*v, *s, *body[len(v) + len(s) :])
 
 
-@overload(body_of, **_OPTIONS)
+@compiled(body_of)
 def _body_of(v, s, body):
     if body.count == 4:
         return lambda v, s, body: (v[0], v[1], s[0], body[3])
@@ -305,7 +300,7 @@ def choose(condition, one, two):
     return one if condition else two
 
 
-@overload(choose, **_OPTIONS)
+@compiled(choose)
 def _choose(condition, one, two):
     if condition == MASK:
         return lambda condition, one, two: choose_lanes(condition, one, two)
@@ -317,7 +312,7 @@ def summed(value):
     return value
 
 
-@overload(summed, **_OPTIONS)
+@compiled(summed)
 def _summed(value):
     return (lambda value: total(value)) if value == LANES else (lambda value: value)
 
@@ -327,6 +322,6 @@ def greatest(value):
     return value
 
 
-@overload(greatest, **_OPTIONS)
+@compiled(greatest)
 def _greatest(value):
     return (lambda value: largest(value)) if value == LANES else (lambda value: value)

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba.extending import overload
-
 from granufab.kernels.access import item, set_item, summed
-from granufab.kernels.options import INLINED, inlined, kernel
+from granufab.kernels.options import compiled, inlined, kernel
 from granufab.kernels.vectors import dot, scale
 
 __all__ = ["add_outer", "cell_weight", "hand_on", "move_cell", "stretching"]
-
-_OPTIONS: dict[str, Any] = {"jit_options": INLINED}
 
 
 def _by_dimension(vector: Any, two: Any, three: Any) -> Any:
@@ -54,7 +50,7 @@ def _add_item(target, weight, k, a, b):
     set_item(target, k, item(target, k) + item(weight, k) * summed(a * b))
 
 
-@overload(add_outer, **_OPTIONS)
+@compiled(add_outer)
 def _add_outer(target, weight, a, b):
     def two(target, weight, a, b):
         _add_item(target, weight, 0, a[0], b[0])
@@ -81,7 +77,7 @@ def stretching(rate, a):
     return tuple(sum(rate[k * len(a) + l] * a[l] for l in range(len(a))) for k in range(len(a)))
 
 
-@overload(stretching, **_OPTIONS)
+@compiled(stretching)
 def _stretching(rate, a):
     return _by_dimension(
         a,
@@ -111,7 +107,7 @@ def cell_weight(weight, n, length):
     return normal, 0.0, max(s)
 
 
-@overload(cell_weight, **_OPTIONS)
+@compiled(cell_weight)
 def _cell_weight(weight, n, length):
     def two(weight, n, length):
         xx, yy = n[0] * n[0], n[1] * n[1]

@@ -14,10 +14,8 @@ stress-driven shape of the cell W_nt ≠ 0 and the 2D solution is one of three c
 
 from __future__ import annotations
 
-from numba.extending import overload
-
 from granufab.kernels.access import choose
-from granufab.kernels.options import INLINED, inlined
+from granufab.kernels.options import compiled, inlined
 from granufab.kernels.vectors import axpy, norm, norm2, scale, shorten, sub
 
 __all__ = ["cone_defect", "crossed_law", "separate_law", "slide_or_stick"]
@@ -90,7 +88,7 @@ def crossed_law(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
     return new_n, (new_t,)
 
 
-@overload(crossed_law, jit_options=INLINED)
+@compiled(crossed_law)
 def _crossed_law(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
     def disk(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
         new_n, new_t = slide_or_stick(p_n, p_t[0], u_n, u_t[0], w_nn, w_nt, w_tt, mu)

@@ -16,9 +16,9 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel.models import PrimitiveModel
-from numba.extending import intrinsic, overload, register_model
+from numba.extending import register_model
 
-from granufab.kernels.options import ARITHMETIC, INLINED
+from granufab.kernels.options import ARITHMETIC, compiled, intrinsic
 
 __all__ = [
     "LANES",
@@ -109,7 +109,7 @@ def _binary(function: Any, result: Any, emit: Callable[..., Any]) -> None:
     def choose(a, b):
         return (lambda a, b: code(a, b)) if _of_lanes(a, b) else None
 
-    overload(function, jit_options=INLINED)(choose)
+    compiled(function)(choose)
 
 
 def _unary(function: Any, emit: Callable[..., Any]) -> None:
@@ -120,7 +120,7 @@ def _unary(function: Any, emit: Callable[..., Any]) -> None:
     def choose(a):
         return (lambda a: code(a)) if a == LANES else None
 
-    overload(function, jit_options=INLINED)(choose)
+    compiled(function)(choose)
 
 
 def _pick(comparison: str) -> Callable[..., Any]:

@@ -13,16 +13,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from numba import njit
+from numba import extending, njit
 from numba.core import config
+from numba.extending import overload
 
-__all__ = ["ARITHMETIC", "INLINED", "cache_folder", "inlined", "kernel"]
+__all__ = ["ARITHMETIC", "cache_folder", "compiled", "inlined", "intrinsic", "kernel"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 ARITHMETIC: dict[str, Any] = {"fastmath": {"contract", "nsz", "nnan"}, "error_model": "numpy"}
 
-INLINED: dict[str, Any] = {**ARITHMETIC, "forceinline": True}
-"""Options of small functions that kernels are made of: never called, always inlined."""
+_INLINED: dict[str, Any] = {**ARITHMETIC, "forceinline": True}
 
 
 def cache_folder() -> str:
@@ -58,5 +58,15 @@ def kernel(function: F) -> F:
 
 def inlined(function: F) -> F:
     """Compile ``function`` as a part of the kernels that call it."""
-    compiled: Any = njit(nogil=True, **INLINED)(function)
+    compiled: Any = njit(nogil=True, **_INLINED)(function)
     return compiled
+
+
+def compiled(function: Callable[..., Any]) -> Callable[[F], F]:
+    """The decorated function chooses, by types, the text that kernels inline for ``function``."""
+    choose: Any = overload
+    return choose(function, jit_options=_INLINED)
+
+
+intrinsic: Any = extending.intrinsic
+"""A function of kernels written in LLVM's language."""

@@ -11,12 +11,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba.extending import overload
 
 from granufab.kernels.access import address
 from granufab.kernels.cell import cell_weight
 from granufab.kernels.lanes import WIDTH
-from granufab.kernels.options import INLINED, kernel
+from granufab.kernels.options import compiled, kernel
 from granufab.kernels.problem import Problem
 from granufab.kernels.vectors import inverse_mass, load
 
@@ -72,7 +71,7 @@ def places(like):
     )
 
 
-@overload(places, jit_options=INLINED)
+@compiled(places)
 def _places(like):
     if like.count == 2:
         return lambda like: Places(0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12)

@@ -52,7 +52,7 @@ from granufab.kernels.vectors import (
     tangential,
 )
 
-__all__ = ["Law", "defects", "sweep"]
+__all__ = ["Law", "defects", "lag_of", "sweep"]
 
 LAG, LAGS = 64, 50  # the cell is moved after 64 contacts, and at least 50 times a sweep
 
@@ -82,6 +82,12 @@ def numbers_of(law: Law):
     return _Numbers(law.softness, law.spin_factor, law.coupled, law.dilation_weight)
 
 
+@inlined
+def lag_of(batch_count):
+    """Batches between two moves of the cell."""
+    return max(1, min(LAG // WIDTH, batch_count // LAGS))
+
+
 @kernel
 def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     """One forward sweep over some batches.
@@ -107,7 +113,7 @@ def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     flow, pushes = address(rate), address(scratch)
     dilation, pushed, pending = rate[0, 0], 0.0, 0.0
     moved, length2 = 0.0, 0.0
-    lag = max(1, min(LAG // WIDTH, slots.starts[-1] // LAGS))
+    lag = lag_of(slots.starts[-1])
     until = lag
     for batch in range(start, end):
         for lane in range(0, WIDTH, stride(like)):

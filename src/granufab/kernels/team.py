@@ -11,9 +11,8 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
-from granufab.kernels.options import kernel
+from granufab.kernels.options import intrinsic, kernel
 
 __all__ = ["COUNTERS", "meet"]
 

@@ -14,9 +14,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba.extending import overload
-
-from granufab.kernels.options import INLINED
+from granufab.kernels.options import compiled
 
 __all__ = [
     "add",
@@ -40,8 +38,6 @@ __all__ = [
     "tangential",
 ]
 
-_OPTIONS: dict[str, Any] = {"jit_options": INLINED}
-
 
 def _choose(vector: Any, two: Any, three: Any, one: Any = None) -> Any:
     return {1: one, 2: two, 3: three}[getattr(vector, "count", None) or len(vector)]
@@ -52,7 +48,7 @@ def dot(a, b):
     return sum(x * y for x, y in zip(a, b, strict=True))
 
 
-@overload(dot, **_OPTIONS)
+@compiled(dot)
 def _dot(a, b):
     return _choose(
         a,
@@ -67,7 +63,7 @@ def norm2(a):
     return dot(a, a)
 
 
-@overload(norm2, **_OPTIONS)
+@compiled(norm2)
 def _norm2(a):
     return lambda a: dot(a, a)
 
@@ -77,7 +73,7 @@ def norm(a):
     return math.sqrt(dot(a, a))
 
 
-@overload(norm, **_OPTIONS)
+@compiled(norm)
 def _norm(a):
     if a.count == 1:
         return lambda a: abs(a[0])
@@ -89,7 +85,7 @@ def add(a, b):
     return tuple(x + y for x, y in zip(a, b, strict=True))
 
 
-@overload(add, **_OPTIONS)
+@compiled(add)
 def _add(a, b):
     return _choose(
         a,
@@ -104,7 +100,7 @@ def sub(a, b):
     return tuple(x - y for x, y in zip(a, b, strict=True))
 
 
-@overload(sub, **_OPTIONS)
+@compiled(sub)
 def _sub(a, b):
     return _choose(
         a,
@@ -119,7 +115,7 @@ def scale(s, a):
     return tuple(s * x for x in a)
 
 
-@overload(scale, **_OPTIONS)
+@compiled(scale)
 def _scale(s, a):
     return _choose(
         a,
@@ -134,7 +130,7 @@ def axpy(s, a, b):
     return tuple(s * x + y for x, y in zip(a, b, strict=True))
 
 
-@overload(axpy, **_OPTIONS)
+@compiled(axpy)
 def _axpy(s, a, b):
     return _choose(
         a,
@@ -149,7 +145,7 @@ def load(array, i, like):
     return tuple(float(array[i, k]) for k in range(len(like)))
 
 
-@overload(load, **_OPTIONS)
+@compiled(load)
 def _load(array, i, like):
     return _choose(
         like,
@@ -163,7 +159,7 @@ def load_tangent(array, i, like):
     return tuple(float(array[i, k]) for k in range(1 if len(like) == 2 else 3))
 
 
-@overload(load_tangent, **_OPTIONS)
+@compiled(load_tangent)
 def _load_tangent(array, i, like):
     return _choose(
         like,
@@ -178,7 +174,7 @@ def store(array, i, a):
         array[i, k] = value
 
 
-@overload(store, **_OPTIONS)
+@compiled(store)
 def _store(array, i, a):
     def one(array, i, a):
         array[i, 0] = a[0]
@@ -200,7 +196,7 @@ def spin(motion, i, like):
     return (motion[i, 2],) if len(like) == 2 else (motion[i, 3], motion[i, 4], motion[i, 5])
 
 
-@overload(spin, **_OPTIONS)
+@compiled(spin)
 def _spin(motion, i, like):
     return _choose(
         like,
@@ -215,7 +211,7 @@ def store_spin(motion, i, s, like):
         motion[i, len(like) + k] = value
 
 
-@overload(store_spin, **_OPTIONS)
+@compiled(store_spin)
 def _store_spin(motion, i, s, like):
     def two(motion, i, s, like):
         motion[i, 2] = s[0]
@@ -233,7 +229,7 @@ def inverse_mass(motion, i, like):
     return motion[i, 3] if len(like) == 2 else motion[i, 6]
 
 
-@overload(inverse_mass, **_OPTIONS)
+@compiled(inverse_mass)
 def _inverse_mass(motion, i, like):
     return _choose(
         like,
@@ -249,7 +245,7 @@ def tangential(u, n, u_n):
     return tuple(x - u_n * y for x, y in zip(u, n, strict=True))
 
 
-@overload(tangential, **_OPTIONS)
+@compiled(tangential)
 def _tangential(u, n, u_n):
     return _choose(
         n,
@@ -269,7 +265,7 @@ def slip(s, n):
     )
 
 
-@overload(slip, **_OPTIONS)
+@compiled(slip)
 def _slip(s, n):
     return _choose(
         n,
@@ -289,7 +285,7 @@ def moment(n, p_t):
     return slip(n, p_t)
 
 
-@overload(moment, **_OPTIONS)
+@compiled(moment)
 def _moment(n, p_t):
     return _choose(n, lambda n, p_t: (p_t[0],), lambda n, p_t: slip(n, p_t))
 
@@ -301,7 +297,7 @@ def compose(n, p_n, p_t):
     return tuple(p_n * x + y for x, y in zip(n, p_t, strict=True))
 
 
-@overload(compose, **_OPTIONS)
+@compiled(compose)
 def _compose(n, p_n, p_t):
     return _choose(
         n,
@@ -315,7 +311,7 @@ def matvec(matrix, a):
     return tuple(sum(matrix[k, l] * a[l] for l in range(len(a))) for k in range(len(a)))
 
 
-@overload(matvec, **_OPTIONS)
+@compiled(matvec)
 def _matvec(matrix, a):
     return _choose(
         a,
@@ -336,7 +332,7 @@ def shorten(a, longest):
     return scale(min(1.0, longest / max(norm(a), 1e-300)), a)
 
 
-@overload(shorten, **_OPTIONS)
+@compiled(shorten)
 def _shorten(a, longest):
     if a.count == 1:
         return lambda a, longest: (min(max(a[0], -1.0 * longest), longest),)

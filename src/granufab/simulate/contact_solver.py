@@ -7,8 +7,8 @@ the result has the same bits for any number of threads.
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
-from typing import NamedTuple
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import binding
@@ -25,7 +25,7 @@ from granufab.kernels.team import COUNTERS
 from granufab.packing import Array, IntArray
 from granufab.simulate.bodies import aligned
 
-__all__ = ["ContactSolver", "Solution", "thread_count", "wide_by_default"]
+__all__ = ["ContactSolver", "Packed", "Solution", "thread_count", "wide_by_default"]
 
 CHUNK_GRAINS, MOST_CHUNKS = 3000, 64
 
@@ -59,9 +59,18 @@ def wide_by_default() -> bool:
 
     GRANUFAB_LANES=0 switches it off.
     """
-    if config.DISABLE_JIT or os.environ.get("GRANUFAB_LANES") == "0":
+    if getattr(config, "DISABLE_JIT", 0) or os.environ.get("GRANUFAB_LANES") == "0":
         return False
     return bool(binding.get_host_cpu_features().get("avx2"))
+
+
+class Packed(NamedTuple):
+    """A packed problem: contacts, shared law, slot of every contact, numbers of a batch."""
+
+    slots: Slots
+    law: Law
+    order: IntArray
+    size: int
 
 
 class ContactSolver:
@@ -83,11 +92,11 @@ class ContactSolver:
         wide: bool | None = None,
     ) -> None:
         self.grain_count, self.dimension = grain_count, dimension
-        self.chunk_count = min(MOST_CHUNKS, max(1, grain_count // CHUNK_GRAINS))
-        self.threads = min(threads or thread_count(), self.chunk_count)
         self.like = (0.0,) * dimension
+        self.threads = threads or thread_count()
         self.wide = wide_by_default() if wide is None else wide
         self.chunk = np.zeros(grain_count, np.int64)
+        self.divide(min(MOST_CHUNKS, max(1, grain_count // CHUNK_GRAINS)))
         self._pool: ThreadPoolExecutor | None = None
         self._values, self._index = aligned((0,)), np.zeros((2, 0), np.uint32)
         self._work: Work | None = None
@@ -95,8 +104,14 @@ class ContactSolver:
     def arrange(self, position: Array, matrix: Array, origin: Array) -> None:
         """Divide the grains into chunks that lie together."""
         if self.chunk_count > 1:
-            order = morton_order(position, origin, np.linalg.inv(matrix))
-            self.chunk[order] = np.arange(self.grain_count) * self.chunk_count // self.grain_count
+            self.divide(self.chunk_count, morton_order(position, origin, np.linalg.inv(matrix)))
+
+    def divide(self, chunk_count: int, order: IntArray | None = None) -> None:
+        """Divide the grains into chunks of equal size, as they are numbered or in this order."""
+        self.chunk_count = chunk_count
+        self.threads = min(self.threads, chunk_count)
+        turn = np.arange(self.grain_count)
+        self.chunk[turn if order is None else order] = turn * chunk_count // self.grain_count
 
     def solve(
         self, problem: Problem, state: State, settings: tuple[float, int, float, float]
@@ -108,7 +123,13 @@ class ContactSolver:
             state: impulses, body records, free rates of the cell.
             settings: (tolerance, max_sweeps, momentum cap, floor), see ``kernels.solve``.
         """
-        like = self.like
+        packed = self.pack(problem, state)
+        solution = self.iterate(packed, state, settings)
+        unpack(packed.slots, packed.size, packed.order, state.impulse_n, state.impulse_t, self.like)
+        return solution
+
+    def pack(self, problem: Problem, state: State) -> Packed:
+        """The contacts in the order of the sweep; valid until the next call."""
         law = Law(
             problem.softness, problem.spin_factor, problem.coupled,
             problem.dilation_weight, problem.weight,
@@ -117,37 +138,31 @@ class ContactSolver:
         starts = schedule(
             problem.first, problem.second, self.grain_count, self.chunk, self.chunk_count, order
         )
-        size = fields(like, problem.coupled) * WIDTH
+        size = fields(self.like, problem.coupled) * WIDTH
         slots = self._slots(starts, size)
-        pack(problem, state.motion, state.impulse_n, state.impulse_t, order, slots, like)
+        pack(problem, state.motion, state.impulse_n, state.impulse_t, order, slots, self.like)
+        return Packed(slots, law, order, size)
+
+    def iterate(
+        self, packed: Packed, state: State, settings: tuple[float, int, float, float]
+    ) -> Solution:
+        """Sweep; impulses stay in the packed contacts, velocities and rates in ``state``."""
         work = self._workspace(state.motion)
         work.cells[-1, 0] = state.rate
-        solution = Solution(*self._run(slots, state.motion, law, work, size, settings))
-        state.rate[:] = work.cells[-1, 0]
-        unpack(slots, size, order, state.impulse_n, state.impulse_t, like)
-        return solution
-
-    def _run(
-        self,
-        slots: Slots,
-        bodies: Array,
-        law: Law,
-        work: Work,
-        size: int,
-        settings: tuple[float, int, float, float],
-    ) -> tuple[int, float, float, float]:
         like = (self.like,) if self.wide else self.like
         members = self.threads
-        if members == 1:
-            return solve(slots, bodies, law, work, like, size, settings, 0, 1)
-        if self._pool is None:
-            self._pool = ThreadPoolExecutor(members - 1, thread_name_prefix="granufab")
-        common = (slots, bodies, law, work, like, size, settings)
-        others = [self._pool.submit(solve, *common, k, members) for k in range(1, members)]
+        common = (packed.slots, state.motion, packed.law, work, like, packed.size, settings)
+        others = [self._submit(*common, k, members) for k in range(1, members)]
         found = solve(*common, 0, members)
         for other in others:
             other.result()
-        return found
+        state.rate[:] = work.cells[-1, 0]
+        return Solution(*found)
+
+    def _submit(self, *arguments: Any) -> Future[Any]:
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self.threads - 1, thread_name_prefix="granufab")
+        return self._pool.submit(solve, *arguments)
 
     def _slots(self, starts: IntArray, size: int) -> Slots:
         batches = int(starts[-1])
@@ -158,7 +173,7 @@ class ContactSolver:
         return Slots(self._values, self._index[0], self._index[1], starts)
 
     def _workspace(self, bodies: Array) -> Work:
-        if self._work is None:
+        if self._work is None or len(self._work.sums) != self.chunk_count + 1:
             dimension, chunks = self.dimension, self.chunk_count
             self._work = Work(
                 before=aligned(bodies.shape),
