@@ -134,7 +134,7 @@ def _frozen(value: Any, name: str) -> Array:
 def _matrix(value: Any, size: int) -> sparse.csr_array:
     """W as canonical read-only CSR."""
     try:
-        W = sparse.csr_array(value, dtype=np.float64, copy=True)
+        W: Any = sparse.csr_array(value, dtype=np.float64, copy=True)
     except (TypeError, ValueError):
         raise InvalidProblem("W is not a matrix of numbers, sparse or dense") from None
     if W.shape != (size, size):

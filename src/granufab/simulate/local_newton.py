@@ -59,9 +59,7 @@ def newton_steps(
     return best, lowest, limit
 
 
-def _search(
-    problem: ScaledProblem, impulse: Array, law: _Law, change: Array
-) -> tuple[Array, _Law]:
+def _search(problem: ScaledProblem, impulse: Array, law: _Law, change: Array) -> tuple[Array, _Law]:
     """Halve the step until ‖F‖ falls; the whole step where it never does."""
     share = 1.0
     while share >= SHORTEST:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from granufab.errors import InvalidProblem
@@ -34,7 +35,7 @@ class ScaledProblem(NamedTuple):
     W: sparse.bsr_array
     q: Array
     mu: Array
-    mobile: Array
+    mobile: NDArray[np.bool_]
     impulse_unit: Array
     weight: Array
 

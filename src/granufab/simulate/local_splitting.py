@@ -70,7 +70,7 @@ def _modified(problem: ScaledProblem, impulse: Array) -> Array:
     return velocity
 
 
-def _balance(primal: float, dual: float) -> float:
+def _balance(primal: np.floating, dual: np.floating) -> float:
     """What to multiply ρ by."""
     if primal > UNBALANCED * dual:
         return 2.0
