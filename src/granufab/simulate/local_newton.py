@@ -2,8 +2,10 @@
 
 With y = r − u (scaled so that ρ = 1), F_N = r_N − max(0, y_N) and F_T = r_T − proj(y_T) on the
 disk of radius µ max(0, y_N); F = 0 exactly at solutions. A step solves J Δr = −F with
-J = 1 − D + D (W + ε), D the blocks of the derivative by y. ε makes steps unique where the
-impulses are not; it only slows the approach, for F itself has no ε.
+J = 1 − D + D (W + ε), D the blocks of the derivative by y. ε makes steps unique and short where
+the impulses are not unique. It follows the residual: of the order of what is still wrong, it
+carries rigid packings through, where a fixed small one fails; as it fades the last steps are
+Newton's own, and the answer has no part of it, for F has none.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from granufab.simulate.local_residual import ScaledProblem
 
 __all__ = ["newton_steps"]
 
-EPSILON = 1e-9
+SMALLEST, LARGEST = 1e-9, 1e-3
 SHORTEST = 1e-3
 PATIENCE = 20
 
@@ -48,7 +50,8 @@ def newton_steps(
     law = _law(problem, impulse)
     best, lowest, since = impulse, problem.residual(impulse), 0
     for step in range(limit):
-        change = _direction(problem, law)
+        epsilon = min(max(lowest, SMALLEST), LARGEST)
+        change = _direction(problem, law, epsilon)
         if lowest <= tolerance or since == PATIENCE or change is None:
             return best, lowest, step
         impulse, law = _search(problem, impulse, law, change)
@@ -71,13 +74,13 @@ def _search(problem: ScaledProblem, impulse: Array, law: _Law, change: Array) ->
     return impulse + change, _law(problem, impulse + change)
 
 
-def _direction(problem: ScaledProblem, law: _Law) -> Array | None:
+def _direction(problem: ScaledProblem, law: _Law, epsilon: float) -> Array | None:
     """−J⁻¹F, or None where J has no factors."""
     count, d = law.defect.shape
     one = sparse.eye_array(count * d, format="csr")
     order = (law.derivative, np.arange(count), np.arange(count + 1))
     D = sparse.bsr_array(order, shape=one.shape)
-    J = one - D + D @ (problem.W + EPSILON * one)
+    J = one - D + D @ (problem.W + epsilon * one)
     try:
         change = -splu(sparse.csc_array(J)).solve(law.defect.ravel())
     except RuntimeError:

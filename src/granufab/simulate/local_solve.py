@@ -22,7 +22,7 @@ from granufab.simulate.local_splitting import splitting_steps
 
 __all__ = ["solve_local"]
 
-FIRST_ROUND = {"sweeps": 100, "newton": 30, "splitting": 100}
+FIRST_ROUND = {"sweeps": 400, "newton": 60, "splitting": 200}
 LONGER = 4
 CHECK = 10
 MOMENTUM_CAP, GROWTH, CAUTION = 0.9, 1.02, 1.3
