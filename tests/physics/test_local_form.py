@@ -79,6 +79,24 @@ def test_the_rigid_step_solves_the_exported_law(samples) -> None:
     assert max(local_errors(problem, engine.impulse).values()) < 1e-8
 
 
+@pytest.mark.parametrize("seed", [3, 8])
+def test_a_rigid_step_is_solved_to_round_off(seed: int) -> None:
+    """Sweeps stall there, and Newton steps with a fixed small regularisation fail."""
+    packing = compress(random_sample(60, seed=seed), friction=0.3)
+    solver = Solver(stiffness=math.inf, tolerance=1e-5, max_sweeps=2000)
+    simulation = Simulation(
+        packing, ConstantMean(rate=1e-3), material=Material(friction=0.4), solver=solver
+    )
+    for _ in range(5):
+        simulation.step()
+    problem = local_form(simulation.problem, simulation.state)
+    found = solve_local(
+        problem.W, problem.q, problem.mu, dimension=2, tolerance=1e-12, max_iterations=1000
+    )
+    assert found.converged
+    assert found.method == "newton"
+
+
 def test_a_ball_on_a_floor_in_numbers() -> None:
     """One sphere of mass 2 at rest: W = diag(1, 7/2, 7/2)/2, q = h g downwards on the normal."""
     packing = on_floor(grains([[5.0, 5.0, 0.5]], mass=2.0))

@@ -137,6 +137,13 @@ def test_separating_contacts_and_no_contacts_need_no_impulse() -> None:
     assert solve_local(np.empty((0, 0)), [], [], dimension=3).converged
 
 
+def test_light_and_heavy_bodies_together() -> None:
+    W = np.diag([1e-9, 1e-9, 1e9, 1e9])
+    found = solve_local(W, [-1.0, 0.5, -1.0, 1.0], [0.3, 0.3], dimension=2)
+    assert found.converged
+    assert found.impulse == pytest.approx([1e9, -3e8, 1e-9, -3e-10], rel=1e-12)
+
+
 def test_contacts_between_fixed_bodies() -> None:
     W = np.diag([0.0, 0.0, 1.0, 1.0])
     found = solve_local(W, [0.5, 0.1, -1.0, 0.0], [0.3, 0.3], dimension=2)
@@ -155,6 +162,18 @@ def test_a_problem_without_solution_is_not_called_solved() -> None:
     assert not found.converged
     assert found.residual > 0.1
     assert found.iterations <= 500
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_indefinite_matrix_ends_quietly() -> None:
+    rng = np.random.default_rng(0)
+    W = rng.standard_normal((30, 30))
+    W = W + W.T + np.diag(2 * np.abs(np.diag(W)) + 1)
+    assert np.linalg.eigvalsh(W)[0] < -1
+    found = solve_local(W, rng.standard_normal(30), np.full(15, 0.5), dimension=2)
+    problem = LocalProblem(W=W, q=found.velocity - W @ found.impulse, mu=[0.5] * 15, dimension=2)
+    assert np.isfinite(found.residual)
+    assert found.converged is (_worst(problem, found.impulse) < 1e-8)
 
 
 def test_local_errors_sees_each_violation() -> None:
@@ -186,6 +205,12 @@ def test_local_errors_sees_each_violation() -> None:
         ({"W": np.triu(np.ones((4, 4)))}, r"W is not symmetric: entries \(0, 1\) and \(1, 0\)"),
         ({"W": -np.eye(4)}, "must be positive semidefinite"),
         ({"W": "text"}, "W is not a matrix of numbers"),
+        (
+            {"W": np.eye(4) * 1e-320},
+            "the largest entry of W is 1e-320, allowed: 1e-100 to 1e[+]100",
+        ),
+        ({"q": [-1e308, 0, -1, 0]}, r"the largest entry of q is 1e\+308"),
+        ({"mu": [0.3, 1e300]}, r"the largest entry of mu is 1e\+300"),
         ({"start": [0.0]}, r"start has shape \(1,\), expected \(4,\)"),
     ],
 )

@@ -19,6 +19,8 @@ from granufab.packing import Array
 
 __all__ = ["ScaledProblem", "local_errors", "natural_map", "project_on_cone"]
 
+LARGEST = 1e100
+
 
 class ScaledProblem(NamedTuple):
     """The dimensionless problem of the contacts that can be moved.
@@ -44,12 +46,17 @@ class ScaledProblem(NamedTuple):
         """Scale a problem; contacts without normal mobility are left out.
 
         Raises:
-            InvalidProblem: a contact closes and has no normal mobility.
+            InvalidProblem: a contact closes and has no normal mobility, or numbers are so large
+                or small that other units are needed.
         """
         d = problem.dimension
+        _check_range("W", problem.W.data)
+        _check_range("q", problem.q)
+        _check_range("mu", np.append(problem.mu, 1.0))
         diagonal = problem.W.diagonal().reshape(-1, d)
         q = problem.q.reshape(-1, d)
-        mobile = diagonal[:, 0] > 1e-14 * diagonal.max(initial=0.0)
+        mobile = diagonal[:, 0] > 1e-14 * diagonal.max(axis=1)
+        mobile &= diagonal[:, 0] > 1e-20 * diagonal.max(initial=0.0)
         stuck = ~mobile & (q[:, 0] < 0)
         if stuck.any():
             where = int(np.flatnonzero(stuck)[0])
@@ -88,6 +95,15 @@ class ScaledProblem(NamedTuple):
         result = np.zeros((len(self.mobile), impulse.shape[1]))
         result[self.mobile] = impulse * self.impulse_unit[:, None]
         return result.ravel()
+
+
+def _check_range(name: str, values: Array) -> None:
+    largest = float(np.abs(values).max(initial=0.0))
+    if largest and not 1 / LARGEST < largest < LARGEST:
+        raise InvalidProblem(
+            f"the largest entry of {name} is {largest:.3g}, allowed: {1 / LARGEST:.0e} to "
+            f"{LARGEST:.0e}; choose other units"
+        )
 
 
 def project_on_cone(vector: Array, mu: Array) -> Array:

@@ -64,7 +64,8 @@ def solve_local(
     problem = LocalProblem(W=W, q=q, mu=mu, dimension=dimension)
     scaled = ScaledProblem.of(problem)
     search = _Search(scaled, _start(problem, scaled, start), tolerance, max_iterations)
-    search.run()
+    with np.errstate(over="ignore", invalid="ignore"):  # an indefinite W lets iterates grow
+        search.run()
     impulse = scaled.full(search.best)
     counts = search.counts
     return LocalSolution(
@@ -152,7 +153,7 @@ class _Sweeps:
                 residual = problem.residual(now)
                 if residual < lowest:
                     best, lowest = now.copy(), residual
-                if lowest <= tolerance or moved == 0.0:
+                if lowest <= tolerance or moved == 0.0 or not np.isfinite(residual):
                     return best, lowest, sweep
             if moved > GROWTH * last:
                 age, cap = 0, max(0.0, 1 - CAUTION * (1 - cap))
