@@ -6,6 +6,7 @@ __all__ = [
     "CorruptFile",
     "GranufabError",
     "InvalidPacking",
+    "InvalidProblem",
     "InvalidSettings",
     "MissingData",
     "NotConverged",
@@ -19,6 +20,10 @@ class GranufabError(Exception):
 
 class InvalidPacking(GranufabError, ValueError):
     """The arrays of a packing contradict each other."""
+
+
+class InvalidProblem(GranufabError, ValueError):
+    """A contact problem (W, q, mu) contradicts itself or cannot be solved."""
 
 
 class InvalidSettings(GranufabError, ValueError):

@@ -19,6 +19,7 @@ RUN_EXAMPLES = {
     "balance": 2,
     "criterion": 2,
     "forces": 2,
+    "local-problems": 2,
     "orientation": 3,
     "run-file": 2,
     "velocity": 2,

@@ -1,5 +1,6 @@
-"""Files: the run file, series as CSV, datasets as CSV or NetCDF, summaries as JSON."""
+"""Files: the run file, series as CSV, datasets as CSV or NetCDF, summaries as JSON, FCLIB."""
 
+from granufab.io.fclib import read_fclib, read_fclib_guesses, read_fclib_solution, write_fclib
 from granufab.io.formats import FORMATS, Format, detect, read
 from granufab.io.provenance import cpu_name, provenance
 from granufab.io.run_file import RunFileWriter
@@ -17,8 +18,12 @@ __all__ = [
     "json_text",
     "provenance",
     "read",
+    "read_fclib",
+    "read_fclib_guesses",
+    "read_fclib_solution",
     "read_series",
     "write_dataset",
+    "write_fclib",
     "write_json",
     "write_series",
     "write_text",

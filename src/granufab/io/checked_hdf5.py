@@ -16,13 +16,21 @@ from granufab.errors import CorruptFile, GranufabError, MissingData, UnknownForm
 from granufab.io.schema import FORMAT_NAME, SCHEMA_VERSION, Entry, named
 from granufab.io.unclosed_hdf5 import SUPERBLOCK_BYTES, UnclosedFile, is_unclosed
 
-__all__ = ["HDF5_SIGNATURE", "CheckedFile", "is_run_file", "opened"]
+__all__ = [
+    "BROKEN",
+    "HDF5_SIGNATURE",
+    "LARGEST_RATIO",
+    "CheckedFile",
+    "is_run_file",
+    "opened",
+    "storage_fault",
+]
 
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 _LARGEST_CHUNK_BYTES = 16 * 2**20
-_LARGEST_RATIO = 1100  # deflate shrinks by 1032 at most, so no dataset declares more than this
-_BROKEN = (
+LARGEST_RATIO = 1100  # deflate shrinks by 1032 at most, so no dataset declares more than this
+BROKEN = (
     OSError,
     RuntimeError,
     KeyError,
@@ -46,7 +54,7 @@ def is_run_file(path: Path, head: bytes) -> bool:
     try:
         with _open(path) as (file, _):
             return file.attrs.get("format") == FORMAT_NAME
-    except _BROKEN:
+    except BROKEN:
         return True
 
 
@@ -66,7 +74,7 @@ def opened(path: Path) -> Iterator[CheckedFile]:
             yield CheckedFile(file, path, unclosed)
     except GranufabError:
         raise
-    except _BROKEN as error:
+    except BROKEN as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise CorruptFile(f"{path}: cannot be read as a run file ({reason})") from None
 
@@ -187,7 +195,7 @@ class CheckedFile:
             raise self.corrupt(f"{entry.name} holds {len(data)} rows, wanted {first}..{last}")
         written = data.id.get_storage_size()
         bytes_ = (last - first) * data.dtype.itemsize * int(np.prod(data.shape[1:]))
-        if written and bytes_ > _LARGEST_RATIO * written:
+        if written and bytes_ > LARGEST_RATIO * written:
             raise self.corrupt(f"{entry.name} declares {bytes_} bytes, {written} are stored")
         return data[first:last]
 
@@ -215,19 +223,24 @@ class CheckedFile:
         shape = data.shape if fixed else data.shape[1:]
         if shape != wanted or (not fixed and len(data.shape) != len(entry.shape)):
             raise self.corrupt(f"{name} has shape {data.shape}, expected {wanted} per record")
-        self._check_storage(data, name)
+        fault = storage_fault(data, name)
+        if fault:
+            raise self.corrupt(fault)
         self._known[name] = data
         return data
 
-    def _check_storage(self, data: h5py.Dataset, name: str) -> None:
-        if data.is_virtual or data.external:
-            raise self.corrupt(f"{name} lies in another file")
-        properties = data.id.get_create_plist()
-        filters = {properties.get_filter(k)[0] for k in range(properties.get_nfilters())}
-        if not filters <= _FILTERS:
-            raise self.corrupt(f"{name} has filters other than gzip, shuffle and fletcher32")
-        if data.chunks is None:
-            if data.id.get_storage_size() < data.nbytes:
-                raise self.corrupt(f"{name} declares {data.nbytes} bytes that are not stored")
-        elif data.dtype.itemsize * int(np.prod(data.chunks)) > _LARGEST_CHUNK_BYTES:
-            raise self.corrupt(f"{name} has chunks of {data.chunks} items, too large")
+
+def storage_fault(data: h5py.Dataset, name: str) -> str:
+    """Why a dataset is not read (in another file, filters, more declared than stored), or ""."""
+    if data.is_virtual or data.external:
+        return f"{name} lies in another file"
+    properties = data.id.get_create_plist()
+    filters = {properties.get_filter(k)[0] for k in range(properties.get_nfilters())}
+    if not filters <= _FILTERS:
+        return f"{name} has filters other than gzip, shuffle and fletcher32"
+    if data.chunks is None:
+        if data.id.get_storage_size() < data.nbytes:
+            return f"{name} declares {data.nbytes} bytes that are not stored"
+    elif data.dtype.itemsize * int(np.prod(data.chunks)) > _LARGEST_CHUNK_BYTES:
+        return f"{name} has chunks of {data.chunks} items, too large"
+    return ""

@@ -1,6 +1,9 @@
 """Contact Dynamics of disks and spheres: samples, loading, stepping, runs."""
 
 from granufab.simulate.loading import Biaxial, ConstantMean, Isotropic, Loading, SimpleShear
+from granufab.simulate.local_form import contact_frames, local_form, local_state
+from granufab.simulate.local_residual import local_errors
+from granufab.simulate.local_solve import solve_local
 from granufab.simulate.paths import Step, run, run_case, shear
 from granufab.simulate.preparation import Prepared, compress, prepare
 from granufab.simulate.sample import draw_radii, random_sample
@@ -24,10 +27,15 @@ __all__ = [
     "Stage",
     "Step",
     "compress",
+    "contact_frames",
     "draw_radii",
+    "local_errors",
+    "local_form",
+    "local_state",
     "prepare",
     "random_sample",
     "run",
     "run_case",
     "shear",
+    "solve_local",
 ]
