@@ -90,9 +90,7 @@ def test_a_rigid_step_is_solved_to_round_off(seed: int) -> None:
     for _ in range(5):
         simulation.step()
     problem = local_form(simulation.problem, simulation.state)
-    found = solve_local(
-        problem.W, problem.q, problem.mu, dimension=2, tolerance=1e-12, max_iterations=1000
-    )
+    found = solve_local(problem.W, problem.q, problem.mu, dimension=2, tolerance=1e-12)
     assert found.converged
     assert found.method == "newton"
 
