@@ -24,7 +24,7 @@ def _state(packing: Packing, monkeypatch, threads: int, loading: type, wide: boo
     if loading is ConstantMean:
         drive["dimension"] = packing.grains.dimension
     simulation = Simulation(packing, loading(**drive), solver=Solver(tolerance=1e-8))
-    assert simulation.contact_solver.chunk_count == 5
+    assert simulation.contact_solver.chunk_count == 8
     assert simulation.contact_solver.threads == threads
     for _ in range(5):
         assert simulation.step().converged

@@ -34,6 +34,7 @@ __all__ = [
 
 Kernel = Literal["scalar", "fast"]
 NO_SWEEPS = 0.99
+BETA = 0.0  # plain sweeps, by kernels that could do more
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,6 +74,8 @@ class Streams(NamedTuple):
         eps, kappa, w_cell: 1/(k h²), m R²/I, 1/(D M).
         motion: body records, shape (body_count, 4 or 8); changed by a sweep.
         impulse_n, impulse_t: shapes (contact_count,), (contact_count, 1 or 3); changed by a sweep.
+        before_n, before_t: impulses of the iterate before; changed by a sweep.
+        beta: momentum of the impulses.
         dilation: shape (1,); changed by a sweep.
     """
 
@@ -93,6 +96,9 @@ class Streams(NamedTuple):
     motion: Array
     impulse_n: Array
     impulse_t: Array
+    before_n: Array
+    before_t: Array
+    beta: float
     dilation: Array
 
 
@@ -135,6 +141,9 @@ def streams_of(case: Case) -> Streams:
         motion=np.array(case.state.motion),
         impulse_n=line(at.impulse_n),
         impulse_t=columns(at.impulse_t, tangents),
+        before_n=line(at.before_n),
+        before_t=columns(at.before_t, tangents),
+        beta=BETA,
         dilation=np.array(case.state.rate[:1, 0]),
     )
 

@@ -4,7 +4,7 @@
 // Bodies are records of 4 doubles (v_x, v_y, s = R ω, 1/m) in 2D and 8 (v, s, 1/m, 0) in 3D;
 // contacts are separate streams in solve order. Both bodies are loaded into locals, the contact's
 // Signorini–Coulomb problem is solved exactly with the implicit compliance eps, the change is
-// stored. The uniform dilation of the cell is one more body; its change is handed on every `lag`
+// stored. Impulses are extrapolated as momentum wants. The uniform dilation of the cell is one more body; its change is handed on every `lag`
 // contacts.
 
 #include <algorithm>
@@ -31,6 +31,9 @@ struct Problem {
     double* motion;                // body records
     double* impulse_n;
     double* impulse_t;             // 1 or 3 columns
+    double* before_n;              // impulses of the iterate before
+    double* before_t;
+    double beta;                   // momentum: the sweep starts from x + beta (x - before)
     double* dilation;              // one number
 };
 
@@ -59,6 +62,9 @@ double sweep_disks(const Problem& p) {
     Disk* __restrict bodies = reinterpret_cast<Disk*>(p.motion);
     double* __restrict impulse_n = p.impulse_n;
     double* __restrict impulse_t = p.impulse_t;
+    double* __restrict before_n = p.before_n;
+    double* __restrict before_t = p.before_t;
+    const double beta = p.beta;
     const double eps = p.eps, kappa = p.kappa, w_cell = p.w_cell;
     double dilation = *p.dilation, pending = 0.0, moved = 0.0;
     std::int64_t until = p.lag;
@@ -67,7 +73,11 @@ double sweep_disks(const Problem& p) {
         Disk& body_j = bodies[p.second[c]];
         const Disk i = body_i, j = body_j;
         const double nx = p.normal[2 * c], ny = p.normal[2 * c + 1], length = p.length[c];
-        const double p_n = impulse_n[c], p_t = impulse_t[c];
+        const double x_n = impulse_n[c], x_t = impulse_t[c];
+        const double p_n = x_n + beta * (x_n - before_n[c]);
+        const double p_t = x_t + beta * (x_t - before_t[c]);
+        before_n[c] = x_n;
+        before_t[c] = x_t;
         const double ux = j.x - i.x, uy = j.y - i.y;
         const double u_n = nx * ux + ny * uy + p.offset_n[c] + eps * p_n + dilation * length;
         const double u_t = nx * uy - ny * ux - (i.spin + j.spin) + p.offset_t[c] + eps * p_t;
@@ -104,6 +114,9 @@ double sweep_spheres(const Problem& p) {
     const Vector* offset_t = reinterpret_cast<const Vector*>(p.offset_t);
     double* __restrict impulse_n = p.impulse_n;
     Vector* __restrict impulse_t = reinterpret_cast<Vector*>(p.impulse_t);
+    double* __restrict before_n = p.before_n;
+    Vector* __restrict before_t = reinterpret_cast<Vector*>(p.before_t);
+    const double beta = p.beta;
     const double eps = p.eps, kappa = p.kappa, w_cell = p.w_cell;
     double dilation = *p.dilation, pending = 0.0, moved = 0.0;
     std::int64_t until = p.lag;
@@ -111,8 +124,12 @@ double sweep_spheres(const Problem& p) {
         Sphere& body_i = bodies[p.first[c]];
         Sphere& body_j = bodies[p.second[c]];
         const Sphere i = body_i, j = body_j;
-        const Vector n = normal[c], p_t = impulse_t[c];
-        const double length = p.length[c], p_n = impulse_n[c];
+        const Vector n = normal[c], x_t = impulse_t[c];
+        const double length = p.length[c], x_n = impulse_n[c];
+        const double p_n = x_n + beta * (x_n - before_n[c]);
+        const Vector p_t = x_t + beta * (x_t - before_t[c]);
+        before_n[c] = x_n;
+        before_t[c] = x_t;
         const Vector u = j.v - i.v;
         const double along = dot(n, u);
         const Vector u_t = u - along * n - cross(i.s + j.s, n) + offset_t[c] + eps * p_t;

@@ -39,7 +39,10 @@ class _Problem(ctypes.Structure):
             for name in ("offset_n", "offset_t", "mu", "inverse_n", "inverse_t")
         ),
         *((name, ctypes.c_double) for name in ("eps", "kappa", "w_cell")),
-        *((name, ctypes.c_void_p) for name in ("motion", "impulse_n", "impulse_t", "dilation")),
+        *((name, ctypes.c_void_p) for name in ("motion", "impulse_n", "impulse_t")),
+        *((name, ctypes.c_void_p) for name in ("before_n", "before_t")),
+        ("beta", ctypes.c_double),
+        ("dilation", ctypes.c_void_p),
     ]
 
 

@@ -20,6 +20,9 @@ from granufab.kernels.lanes import (
     gather_8,
     largest,
     load_lanes,
+    prefetch_4,
+    prefetch_8,
+    prefetch_line,
     read_item,
     scatter_4,
     scatter_8,
@@ -32,6 +35,7 @@ from granufab.kernels.options import compiled
 
 __all__ = [
     "address",
+    "announce",
     "body_of",
     "choose",
     "greatest",
@@ -247,6 +251,30 @@ def _put_body(bodies, index, place, body):
         write_item(bodies, k + 5, body[5])
 
     return disk if body.count == 4 else sphere
+
+
+def announce(slots, bodies, one, two, batch, size, like):
+    """Have a batch and its bodies brought near, some batches before they are swept."""
+
+
+@compiled(announce)
+def _announce(slots, bodies, one, two, batch, size, like):
+    if not isinstance(like[0], types.BaseTuple):
+        return lambda slots, bodies, one, two, batch, size, like: None
+
+    def disks(slots, bodies, one, two, batch, size, like):
+        prefetch_4(bodies, one, batch * WIDTH)
+        prefetch_4(bodies, two, batch * WIDTH)
+        for k in range(0, size, WIDTH):
+            prefetch_line(slots, batch * size + k)
+
+    def spheres(slots, bodies, one, two, batch, size, like):
+        prefetch_8(bodies, one, batch * WIDTH)
+        prefetch_8(bodies, two, batch * WIDTH)
+        for k in range(0, size, WIDTH):
+            prefetch_line(slots, batch * size + k)
+
+    return disks if like[0].count == 2 else spheres
 
 
 def velocity_of(body):

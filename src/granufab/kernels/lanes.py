@@ -30,6 +30,9 @@ __all__ = [
     "gather_8",
     "largest",
     "load_lanes",
+    "prefetch_4",
+    "prefetch_8",
+    "prefetch_line",
     "read_item",
     "scatter_4",
     "scatter_8",
@@ -270,6 +273,47 @@ def _rows(builder: Any, values: Any, width: int) -> list[Any]:
         row = builder.mul(builder.zext(entry, size), ir.Constant(size, width))
         pointers.append(_wide(builder, builder.gep(table, [row]), width))
     return pointers
+
+
+def _prefetch(builder: Any, pointer: Any) -> None:
+    """Ask for the cache line of an address that is going to be changed."""
+    number, byte = ir.IntType(32), ir.IntType(8).as_pointer()
+    kind = ir.FunctionType(ir.VoidType(), [byte, number, number, number])
+    function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+    hints = [ir.Constant(number, hint) for hint in (1, 3, 1)]
+    builder.call(function, [builder.bitcast(pointer, byte), *hints])
+
+
+def _announcing(width: int) -> Callable[..., Any]:
+    def code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        for pointer in _rows(builder, values, width):
+            _prefetch(builder, pointer)
+        return context.get_dummy_value()
+
+    return code
+
+
+@intrinsic
+def prefetch_4(typing_context, table, index, place):
+    """Ask for the rows that :func:`gather_4` reads, ahead of their use."""
+    return types.none(table, index, place), _announcing(4)
+
+
+@intrinsic
+def prefetch_8(typing_context, table, index, place):
+    """Ask for the rows that :func:`gather_8` reads, ahead of their use."""
+    return types.none(table, index, place), _announcing(8)
+
+
+@intrinsic
+def prefetch_line(typing_context, address, place):
+    """Ask for the cache line that holds one item."""
+
+    def code(context, builder, signature, values):
+        _prefetch(builder, builder.gep(values[0], [values[1]]))
+        return context.get_dummy_value()
+
+    return types.none(address, place), code
 
 
 def _interleave(builder: Any, values: list[Any], span: int) -> list[Any]:

@@ -115,15 +115,18 @@ def _remember(bodies, work: Work, member, members):
 
 
 @kernel
+def _extrapolate_line(now, before, beta):
+    for k in range(len(now)):
+        value = now[k]
+        now[k] = value + beta * (value - before[k])
+        before[k] = value
+
+
+@kernel
 def _extrapolate(bodies, work: Work, beta, member, members):
     """now ← now + β (now − before), before ← now, for this member's bodies (first: the cell)."""
     first, end = _rows(len(bodies), member, members)
-    before = work.before
-    for i in range(first, end):
-        for k in range(bodies.shape[1]):
-            value = bodies[i, k]
-            bodies[i, k] = value + beta * (value - before[i, k])
-            before[i, k] = value
+    _extrapolate_line(bodies[first:end].ravel(), work.before[first:end].ravel(), beta)
     if member == 0:
         rate = work.cells[-1, 0]
         for k in range(len(rate)):

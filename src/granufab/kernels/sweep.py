@@ -18,6 +18,7 @@ import numpy as np
 
 from granufab.kernels.access import (
     address,
+    announce,
     body_of,
     greatest,
     inverse_mass_of,
@@ -54,6 +55,7 @@ from granufab.kernels.vectors import (
 
 __all__ = ["Law", "defects", "lag_of", "sweep"]
 
+AHEAD = 6  # batches between asking for memory and using it
 LAG, LAGS = 64, 50  # the cell is moved after 64 contacts, and at least 50 times a sweep
 
 
@@ -116,6 +118,7 @@ def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     lag = lag_of(slots.starts[-1])
     until = lag
     for batch in range(start, end):
+        announce(values, table, one, two, min(batch + AHEAD, end - 1), size, like)
         for lane in range(0, WIDTH, stride(like)):
             base, place = batch * size + lane, batch * WIDTH + lane
             step, new, turn = _visit(

@@ -28,6 +28,7 @@ from granufab.simulate.bodies import aligned
 __all__ = ["ContactSolver", "Packed", "Solution", "thread_count", "wide_by_default"]
 
 CHUNK_GRAINS, MOST_CHUNKS = 3000, 64
+TEAMS = 4  # chunks are a multiple of this, so that so many threads have equal shares
 
 
 class Solution(NamedTuple):
@@ -96,7 +97,8 @@ class ContactSolver:
         self.threads = threads or thread_count()
         self.wide = wide_by_default() if wide is None else wide
         self.chunk = np.zeros(grain_count, np.int64)
-        self.divide(min(MOST_CHUNKS, max(1, grain_count // CHUNK_GRAINS)))
+        teams = -(-(grain_count // CHUNK_GRAINS) // TEAMS)
+        self.divide(min(MOST_CHUNKS, TEAMS * teams) if grain_count >= 2 * CHUNK_GRAINS else 1)
         self._pool: ThreadPoolExecutor | None = None
         self._values, self._index = aligned((0,)), np.zeros((2, 0), np.uint32)
         self._work: Work | None = None
