@@ -7,12 +7,13 @@ slow, not stuck.
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 
-from granufab.kernels.options import intrinsic, kernel
+from granufab.kernels.options import inlined, intrinsic, kernel
 
 __all__ = ["COUNTERS", "meet"]
 
@@ -58,7 +59,13 @@ def _increase(typing_context, array, place):
     return types.int64(array, place), code
 
 
-_yield_processor = types.ExternalFunction("sched_yield", types.int32())
+if os.name == "posix":
+    _yield_processor: Any = types.ExternalFunction("sched_yield", types.int32())
+else:
+
+    @inlined
+    def _yield_processor():
+        """No such call here: keep looking."""
 
 
 @kernel

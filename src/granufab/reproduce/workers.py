@@ -18,6 +18,7 @@ from typing import Any
 from granufab.errors import GranufabError, NotConverged
 from granufab.history import Run
 from granufab.reproduce.case_folder import Progress, RunCase, run_into_folder
+from granufab.simulate.contact_solver import thread_count
 from granufab.simulate.settings import Case, Sample
 
 __all__ = ["Job", "nearest_sample", "run_jobs"]
@@ -210,7 +211,7 @@ def _run_parallel(
         workers,
         mp_context=context,
         initializer=_start_worker,
-        initargs=(sender, context.Lock(), stop),
+        initargs=(sender, context.Lock(), stop, max(1, thread_count() // workers)),
     )
     futures: dict[Future[Any], int] = {}
 
@@ -276,7 +277,8 @@ def _end(pool: ProcessPoolExecutor, futures: Sequence[Future[None]], others: set
 _channel: dict[str, Any] = {}  # of a worker process: where it reports, and the word to stop
 
 
-def _start_worker(sender: Connection, turn: Any, stop: Any) -> None:
+def _start_worker(sender: Connection, turn: Any, stop: Any, threads: int) -> None:
+    os.environ["GRANUFAB_THREADS"] = str(threads)  # the processors are shared by the workers
     # The parent decides when to stop: Ctrl-C reaches the whole group of processes.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _channel.update(sender=sender, turn=turn, stop=stop)
