@@ -16,9 +16,9 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel.models import PrimitiveModel
-from numba.extending import register_model
+from numba.extending import lower_builtin, register_model, type_callable
 
-from granufab.kernels.options import ARITHMETIC, compiled, intrinsic
+from granufab.kernels.options import ARITHMETIC, intrinsic
 
 __all__ = [
     "LANES",
@@ -89,41 +89,41 @@ def _spread(builder: Any, value: Any) -> Any:
     return _shuffle(builder, first, empty, [0] * WIDTH)
 
 
-def _define(result: Any, emit: Callable[..., Any]) -> Any:
-    """An intrinsic of lanes (or numbers, spread) whose code is ``emit(builder, *vectors)``."""
-
-    def two(typing_context, a, b):
-        def code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            return emit(builder, *(_spread(builder, value) for value in values))
-
-        return result(a, b), code
-
-    return intrinsic(two)
-
-
 def _of_lanes(*operands: Any) -> bool:
     return LANES in operands and all(x in (LANES, types.float64) for x in operands)
 
 
 def _binary(function: Any, result: Any, emit: Callable[..., Any]) -> None:
-    """Teach ``function(a, b)`` to take lanes."""
-    code = _define(result, emit)
+    """Teach ``function(a, b)`` to take lanes, or lanes and a number, which is spread."""
 
-    def choose(a, b):
-        return (lambda a, b: code(a, b)) if _of_lanes(a, b) else None
+    @type_callable(function)
+    def typing(context):
+        def kind(a, b):
+            return result if _of_lanes(a, b) else None
 
-    compiled(function)(choose)
+        return kind
+
+    def code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return emit(builder, *(_spread(builder, value) for value in values))
+
+    for operands in ((LANES, LANES), (LANES, types.float64), (types.float64, LANES)):
+        lower_builtin(function, *operands)(code)
 
 
 def _unary(function: Any, emit: Callable[..., Any]) -> None:
-    @intrinsic
-    def code(typing_context, a):
-        return LANES(a), lambda context, builder, signature, values: emit(builder, values[0])
+    """Teach ``function(a)`` to take lanes."""
 
-    def choose(a):
-        return (lambda a: code(a)) if a == LANES else None
+    @type_callable(function)
+    def typing(context):
+        def kind(a):
+            return LANES if a == LANES else None
 
-    compiled(function)(choose)
+        return kind
+
+    def code(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return emit(builder, values[0])
+
+    lower_builtin(function, LANES)(code)
 
 
 def _pick(comparison: str) -> Callable[..., Any]:

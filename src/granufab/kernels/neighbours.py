@@ -143,9 +143,14 @@ def find_wall_pairs(position, radius, matrix, origin, periodic, skin, capacity):
     return pairs, found
 
 
-@kernel
-def morton_order(position, origin, inverse):
+def morton_order(position: np.ndarray, origin: np.ndarray, inverse: np.ndarray) -> np.ndarray:
     """Order of grains along a Z-curve through the cell: neighbours lie near in memory."""
+    return np.argsort(_morton_keys(position, origin, inverse), kind="stable")
+
+
+@kernel
+def _morton_keys(position, origin, inverse):
+    """Place of every grain along the curve."""
     count, dimension = position.shape
     bits = 20 if dimension == 3 else 30
     keys = np.zeros(count, np.int64)
@@ -157,4 +162,4 @@ def morton_order(position, origin, inverse):
             place = int((s - np.floor(s)) * 2.0**bits)
             for bit in range(bits):
                 keys[i] |= ((place >> bit) & 1) << (bit * dimension + k)
-    return np.argsort(keys)
+    return keys

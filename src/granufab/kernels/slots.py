@@ -164,7 +164,8 @@ def pack(problem: Problem, motion, impulse_n, impulse_t, order, slots: Slots, li
     spare = len(motion) - 1
     for slot in range(slots.starts[-1] * WIDTH):
         slots.first[slot], slots.second[slot] = spare, spare
-    values[: slots.starts[-1] * size] = 0.0
+    for k in range(slots.starts[-1] * size):
+        values[k] = 0.0
     eps, kappa, weight = problem.softness, problem.spin_factor, address(problem.weight)
     for c in range(len(order)):
         slot = order[c]

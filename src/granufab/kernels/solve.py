@@ -18,8 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from granufab.kernels.access import address, item, set_item
 from granufab.kernels.cell import move_cell
-from granufab.kernels.options import kernel
+from granufab.kernels.options import inlined, kernel
 from granufab.kernels.slots import Slots
 from granufab.kernels.sweep import Law, defects, sweep
 from granufab.kernels.team import meet
@@ -97,9 +98,15 @@ def solve(slots: Slots, bodies, law: Law, work: Work, like, size, settings, memb
 
 @kernel
 def _begin(work: Work):
-    work.control[:] = 0.0
-    work.sums[:] = 0.0
-    work.rate_before[:] = work.cells[-1, 0]
+    for k in range(CONTROLS):
+        work.control[k] = 0.0
+    for chunk in range(len(work.sums)):
+        for k in range(SUMS):
+            work.sums[chunk, k] = 0.0
+    rate = work.cells[-1, 0]
+    for k in range(len(rate)):
+        for l in range(len(rate)):
+            work.rate_before[k, l] = rate[k, l]
 
 
 @kernel
@@ -111,22 +118,25 @@ def _rows(count, member, members):
 @kernel
 def _remember(bodies, work: Work, member, members):
     first, end = _rows(len(bodies), member, members)
-    work.before[first:end] = bodies[first:end]
+    for i in range(first, end):
+        for k in range(bodies.shape[1]):
+            work.before[i, k] = bodies[i, k]
 
 
-@kernel
-def _extrapolate_line(now, before, beta):
-    for k in range(len(now)):
-        value = now[k]
-        now[k] = value + beta * (value - before[k])
-        before[k] = value
+@inlined
+def _extrapolate_line(now, before, start, end, beta):
+    for k in range(start, end):
+        value = item(now, k)
+        set_item(now, k, value + beta * (value - item(before, k)))
+        set_item(before, k, value)
 
 
 @kernel
 def _extrapolate(bodies, work: Work, beta, member, members):
     """now ← now + β (now − before), before ← now, for this member's bodies (first: the cell)."""
     first, end = _rows(len(bodies), member, members)
-    _extrapolate_line(bodies[first:end].ravel(), work.before[first:end].ravel(), beta)
+    width = bodies.shape[1]
+    _extrapolate_line(address(bodies), address(work.before), first * width, end * width, beta)
     if member == 0:
         rate = work.cells[-1, 0]
         for k in range(len(rate)):
@@ -137,13 +147,20 @@ def _extrapolate(bodies, work: Work, beta, member, members):
 
 
 @kernel
+def _start_cell(cell, shared):
+    """The cell as a chunk sees it before its first contact: the shared rates, no push."""
+    for k in range(cell.shape[1]):
+        for l in range(cell.shape[1]):
+            cell[0, k, l], cell[1, k, l], cell[2, k, l] = shared[0, k, l], 0.0, 0.0
+
+
+@kernel
 def _sweep_all(slots: Slots, bodies, law: Law, work: Work, like, size, member, members):
     """One sweep over all chunks, then over the contacts between them."""
     chunks = len(slots.starts) - 2
     beta, cells = work.control[BETA], work.cells
     for chunk in range(member, chunks, members):
-        cells[chunk, 0] = cells[-1, 0]
-        cells[chunk, 1:] = 0.0
+        _start_cell(cells[chunk], cells[-1])
         reach = (slots.starts[chunk], slots.starts[chunk + 1], beta, float(chunks))
         moved, length2 = sweep(slots, bodies, law, reach, cells[chunk], like, size)
         work.sums[chunk, 0], work.sums[chunk, 1] = moved, length2
@@ -152,7 +169,7 @@ def _sweep_all(slots: Slots, bodies, law: Law, work: Work, like, size, member, m
         shared = cells[-1]
         for chunk in range(chunks):
             move_cell(shared[0], cells[chunk, 1])
-        shared[1:] = 0.0
+        _start_cell(shared, shared)
         reach = (slots.starts[chunks], slots.starts[chunks + 1], beta, 1.0)
         moved, length2 = sweep(slots, bodies, law, reach, shared, like, size)
         work.sums[chunks, 0], work.sums[chunks, 1] = moved, length2
