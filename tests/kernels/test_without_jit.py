@@ -41,3 +41,23 @@ def test_plain_and_compiled_kernels_agree(name, plain, compiled):
     assert two == pytest.approx(one, rel=1e-12, abs=1e-12)
     assert np.abs(one).max() > 0
     assert one[-1] > 0, "no contacts were solved"
+
+
+def test_many_contacts_are_packed_without_compilation() -> None:
+    code = (
+        "import numpy as np\n"
+        "from granufab.kernels.slots import schedule\n"
+        "first = np.arange(400, dtype=np.int32)\n"
+        "order = np.empty(400, np.int64)\n"
+        "starts = schedule(first, first + 1, 401, np.zeros(401, np.int64), 1, order)\n"
+        "assert len(set(order.tolist())) == 400 and order.max() < 8 * starts[-1]\n"
+    )
+    package = str(Path(granufab.__file__).resolve().parents[1])
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": package},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr

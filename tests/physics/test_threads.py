@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import os
+import pickle
+
 import numpy as np
 import pytest
 
@@ -51,7 +55,48 @@ def test_one_contact_at_a_time_gives_the_same_motion(packing, monkeypatch):
     assert other.stress == pytest.approx(one.stress, abs=1e-6)
 
 
-@pytest.mark.parametrize("given", ["0", "two", "-1", ""])
+def test_a_failing_member_ends_the_others(packing, monkeypatch):
+    """And the next step starts afresh, with the same result."""
+    simulation = _state(packing, monkeypatch, 2, ConstantMean)
+    other = _state(packing, monkeypatch, 2, ConstantMean)
+    solve = contact_solver.solve
+
+    def fail(*arguments):
+        if arguments[-2] == 0:
+            raise KeyboardInterrupt
+        return solve(*arguments)
+
+    monkeypatch.setattr(contact_solver, "solve", fail)
+    motion, position, matrix = other.motion.copy(), other.position.copy(), other.matrix.copy()
+    with pytest.raises(KeyboardInterrupt):
+        other.step()
+    monkeypatch.setattr(contact_solver, "solve", solve)
+    other.motion[:], other.position[:], other.matrix = motion, position, matrix
+    assert other.step().converged
+    assert simulation.step().converged
+
+
+def test_a_stepped_simulation_can_be_copied_and_pickled(packing, monkeypatch):
+    simulation = _state(packing, monkeypatch, 2, ConstantMean)
+    twins = [pickle.loads(pickle.dumps(simulation)), copy.deepcopy(simulation)]
+    simulation.step()
+    for twin in twins:
+        twin.step()
+        assert np.array_equal(twin.motion, simulation.motion)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_fork_steps_on_with_threads_of_its_own(packing, monkeypatch):
+    simulation = _state(packing, monkeypatch, 2, ConstantMean)
+    child = os.fork()
+    if child == 0:
+        converged = simulation.step().converged
+        os._exit(0 if converged else 1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
+@pytest.mark.parametrize("given", ["0", "two", "-1", "²"])
 def test_a_wrong_number_of_threads_is_refused(monkeypatch, given):
     monkeypatch.setenv("GRANUFAB_THREADS", given)
     with pytest.raises(InvalidSettings, match="GRANUFAB_THREADS is"):

@@ -18,6 +18,7 @@ from granufab.kernels.slots import places, unpack
 from granufab.kernels.sweep import lag_of, sweep
 from granufab.packing import Array, Packing
 from granufab.simulate import Loading, Material, Simulation, Solver
+from granufab.simulate.bodies import aligned
 from granufab.simulate.contact_solver import ContactSolver, Solution, wide_by_default
 
 __all__ = [
@@ -138,7 +139,7 @@ def streams_of(case: Case) -> Streams:
         eps=p.softness,
         kappa=p.spin_factor,
         w_cell=p.dilation_weight,
-        motion=np.array(case.state.motion),
+        motion=_copied_array(case.state.motion),
         impulse_n=line(at.impulse_n),
         impulse_t=columns(at.impulse_t, tangents),
         before_n=line(at.before_n),
@@ -201,8 +202,15 @@ def copy_of(case: Case) -> Case:
 
 
 def _copied(record):
-    arrays = (np.array(x) if isinstance(x, np.ndarray) else x for x in record)
+    arrays = (_copied_array(x) if isinstance(x, np.ndarray) else x for x in record)
     return type(record)(*arrays)
+
+
+def _copied_array(array: np.ndarray) -> np.ndarray:
+    """A copy that begins at a cache line, as the engine's arrays do."""
+    copy = aligned(array.shape, array.dtype.type)
+    copy[...] = array
+    return copy
 
 
 @kernel

@@ -16,6 +16,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel.models import PrimitiveModel
+from numba.core.errors import TypingError
 from numba.extending import lower_builtin, register_model, type_callable
 
 from granufab.kernels.options import ARITHMETIC, intrinsic
@@ -212,6 +213,8 @@ def _wide(builder: Any, pointer: Any, width: int) -> Any:
 @intrinsic
 def address_of(typing_context, array):
     """Where the numbers of an array begin: unlike the array, it is not counted when passed on."""
+    if array.layout != "C":
+        raise TypingError("an address is of an array whose rows follow one another")
 
     def code(context, builder, signature, values):
         return context.make_array(signature.args[0])(context, builder, values[0]).data

@@ -115,7 +115,7 @@ def schedule(first, second, grain_count, chunk, chunk_count, order):
         listed[fill[home]] = c
         fill[home] += 1
     last = np.full(grain_count, -1, np.int64)
-    taken = np.zeros(count + 1, np.int8)
+    taken = np.zeros(count + 1, np.int64)
     low, top = 0, 0
     for k in range(chunk_count + 1):
         starts[k], low = top, top

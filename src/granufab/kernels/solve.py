@@ -23,7 +23,7 @@ from granufab.kernels.cell import move_cell
 from granufab.kernels.options import inlined, kernel
 from granufab.kernels.slots import Slots
 from granufab.kernels.sweep import Law, defects, sweep
-from granufab.kernels.team import meet
+from granufab.kernels.team import given_up, meet
 
 __all__ = ["CHECK", "CONTROLS", "SUMS", "Work", "solve"]
 
@@ -42,7 +42,7 @@ class Work(NamedTuple):
     Attributes:
         before: body velocities of the iterate before, shape of ``bodies``.
         cells: (free rates, push, scratch) of the cell as each chunk sees it, and last for all,
-            shape (chunk_count + 2, 3, D, D).
+            shape (chunk_count + 1, 3, D, D).
         rate_before: free rates of the iterate before, shape (D, D).
         sums: of every chunk, shape (chunk_count + 1, SUMS).
         control: what the first member decided, shape (CONTROLS,).
@@ -81,7 +81,7 @@ def solve(slots: Slots, bodies, law: Law, work: Work, like, size, settings, memb
     _judge(slots, bodies, law, work, like, size, settings, member, members)
     state = (settings[2], settings[2], 0, 0, np.inf)
     watch = (0, np.inf, 0, 1.0)
-    while control[DONE] == 0.0:
+    while control[DONE] == 0.0 and (members == 1 or not given_up(work.counters)):
         _extrapolate(bodies, work, control[BETA], member, members)
         meet(work.counters, members)
         _sweep_all(slots, bodies, law, work, like, size, member, members)

@@ -3,7 +3,7 @@
 Both bodies are loaded into locals, the contact is solved exactly, the change is stored: a local
 Signorini–Coulomb problem per contact (``contact_law``). The text is the same for one contact and
 for a batch of eight that share no body. The cell's free rates are one more body; their change is
-handed on every 64 contacts, which frees the sweep of a serial dependency.
+handed on every 64 contacts (more often in small problems): the sweep has no serial dependency.
 
 Chunks of contacts may be swept side by side: each then takes the cell to move as if the others
 pushed it alike (its own push times the number of chunks); the sum of the true pushes is applied

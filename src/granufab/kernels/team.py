@@ -1,8 +1,8 @@
 """Threads that solve one step together: atomic counters and a barrier.
 
 Every member runs the same kernel without the interpreter lock and knows its number; they meet at
-barriers. A member that waits long gives its processor away, so more members than processors are
-slow, not stuck.
+barriers. Where the system can be asked to, a member that waits long gives its processor away, so
+more members than processors are slow, not stuck.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from numba import types
 
 from granufab.kernels.options import inlined, intrinsic, kernel
 
-__all__ = ["COUNTERS", "meet"]
+__all__ = ["COUNTERS", "GIVE_UP", "given_up", "meet"]
 
 COUNTERS = 32
 """Length of the array of counters (int64) that a team shares; the used ones lie far apart."""
 
-ARRIVED, ROUND = 0, 16
+ARRIVED, ROUND, GIVE_UP = 0, 16, 24
 PATIENCE = 2000
 
 
@@ -68,9 +68,18 @@ else:
         """No such call here: keep looking."""
 
 
+@inlined
+def given_up(counters):
+    """Whether somebody wrote ``counters[GIVE_UP]``: a member is missing, the others are to end."""
+    return _read(counters, GIVE_UP) != 0
+
+
 @kernel
 def meet(counters, members):
-    """Wait until all members are here; what each wrote before is seen by all after."""
+    """Wait until all members are here; what each wrote before is seen by all after.
+
+    Nobody waits once the team has given up.
+    """
     if members == 1:
         return
     now = _read(counters, ROUND)
@@ -79,7 +88,7 @@ def meet(counters, members):
         _increase(counters, ROUND)
         return
     waited = 0
-    while _read(counters, ROUND) == now:
+    while _read(counters, ROUND) == now and not given_up(counters):
         waited += 1
         if waited > PATIENCE:
             _yield_processor()

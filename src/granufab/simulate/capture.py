@@ -11,7 +11,8 @@ from granufab.fabric import quick_measure
 from granufab.fabric.criterion import force_threshold
 from granufab.history import Frame, StepStatistics
 from granufab.packing import Array, Cell, Contacts, Grains, IntArray, Packing, WallContacts
-from granufab.simulate.stepping import Simulation, StepReport
+from granufab.simulate.step_report import StepReport
+from granufab.simulate.stepping import Simulation
 
 __all__ = ["StepTally", "capture_frame", "capture_packing", "measure_now", "merge", "series_row"]
 

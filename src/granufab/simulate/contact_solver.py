@@ -7,7 +7,9 @@ the result has the same bits for any number of threads.
 from __future__ import annotations
 
 import os
-from concurrent.futures import Future, ThreadPoolExecutor
+import sys
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,14 +23,16 @@ from granufab.kernels.problem import Problem, State
 from granufab.kernels.slots import Slots, fields, pack, schedule, unpack
 from granufab.kernels.solve import CONTROLS, SUMS, Work, solve
 from granufab.kernels.sweep import Law
-from granufab.kernels.team import COUNTERS
+from granufab.kernels.team import COUNTERS, GIVE_UP
 from granufab.packing import Array, IntArray
 from granufab.simulate.bodies import aligned
 
 __all__ = ["ContactSolver", "Packed", "Solution", "thread_count", "wide_by_default"]
 
 CHUNK_GRAINS, MOST_CHUNKS = 3000, 64
-TEAMS = 4  # chunks are a multiple of this, so that so many threads have equal shares
+"""Grains for one chunk; from twice as many on the number of chunks is rounded up to ``TEAMS``."""
+TEAMS = 4
+"""Chunks are a multiple of this, so that two or four threads have equal shares."""
 
 
 class Solution(NamedTuple):
@@ -43,16 +47,31 @@ class Solution(NamedTuple):
 def thread_count() -> int:
     """Threads of a run: GRANUFAB_THREADS, else the processors this process may use.
 
+    Teams wait actively, so the default is 1 where a waiting thread cannot give its processor
+    away (not POSIX) and at most what a container is allowed.
+
     Raises:
         InvalidSettings: GRANUFAB_THREADS is not a positive integer.
     """
     given = os.environ.get("GRANUFAB_THREADS")
-    if given is None:
+    if not given:
+        if os.name != "posix":
+            return 1
         usable = getattr(os, "sched_getaffinity", None)
-        return len(usable(0)) if usable else os.cpu_count() or 1
-    if not given.isdigit() or int(given) < 1:
+        count = len(usable(0)) if usable else os.cpu_count() or 1
+        return max(1, min(count, _quota()))
+    if not given.isdecimal() or int(given) < 1:
         raise InvalidSettings(f"GRANUFAB_THREADS is {given!r}, must be an integer ≥ 1")
     return int(given)
+
+
+def _quota() -> int:
+    """Processors that the control group of this process may use, rounded up."""
+    try:
+        allowed, period = Path("/sys/fs/cgroup/cpu.max").read_text().split()
+        return -(-int(allowed) // int(period))
+    except (OSError, ValueError):  # no such file, or no limit ("max")
+        return sys.maxsize
 
 
 def wide_by_default() -> bool:
@@ -94,14 +113,24 @@ class ContactSolver:
     ) -> None:
         self.grain_count, self.dimension = grain_count, dimension
         self.like = (0.0,) * dimension
-        self.threads = threads or thread_count()
+        self.wanted = 1 if getattr(config, "DISABLE_JIT", 0) else threads or thread_count()
         self.wide = wide_by_default() if wide is None else wide
         self.chunk = np.zeros(grain_count, np.int64)
         teams = -(-(grain_count // CHUNK_GRAINS) // TEAMS)
         self.divide(min(MOST_CHUNKS, TEAMS * teams) if grain_count >= 2 * CHUNK_GRAINS else 1)
         self._pool: ThreadPoolExecutor | None = None
+        self._process = os.getpid()
         self._values, self._index = aligned((0,)), np.zeros((2, 0), np.uint32)
         self._work: Work | None = None
+
+    @property
+    def threads(self) -> int:
+        """Threads that share a solve: as many as wanted, at most one for each chunk."""
+        return min(self.wanted, self.chunk_count)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but threads and what they share, which are made again when needed."""
+        return {**self.__dict__, "_pool": None, "_work": None}
 
     def arrange(self, position: Array, matrix: Array, origin: Array) -> None:
         """Divide the grains into chunks that lie together."""
@@ -111,7 +140,6 @@ class ContactSolver:
     def divide(self, chunk_count: int, order: IntArray | None = None) -> None:
         """Divide the grains into chunks of equal size, as they are numbered or in this order."""
         self.chunk_count = chunk_count
-        self.threads = min(self.threads, chunk_count)
         turn = np.arange(self.grain_count)
         self.chunk[turn if order is None else order] = turn * chunk_count // self.grain_count
 
@@ -149,21 +177,38 @@ class ContactSolver:
         self, packed: Packed, state: State, settings: tuple[float, int, float, float]
     ) -> Solution:
         """Sweep; impulses stay in the packed contacts, velocities and rates in ``state``."""
+        if self._process != os.getpid():  # a fork has none of its parent's threads
+            self._process, self._pool, self._work = os.getpid(), None, None
         work = self._workspace(state.motion)
         work.cells[-1, 0] = state.rate
         like = (self.like,) if self.wide else self.like
-        members = self.threads
         common = (packed.slots, state.motion, packed.law, work, like, packed.size, settings)
-        others = [self._submit(*common, k, members) for k in range(1, members)]
-        found = solve(*common, 0, members)
-        for other in others:
-            other.result()
+        run: Any = self._together if self.threads > 1 else solve
+        found = run(*common, 0, self.threads)
         state.rate[:] = work.cells[-1, 0]
         return Solution(*found)
 
+    def _together(self, *arguments: Any) -> Any:
+        """Solve with all threads; if one fails the others end, and the next solve starts afresh."""
+        *common, first, members = arguments
+        work: Work = common[3]
+        others: list[Future[Any]] = []
+        run: Any = solve
+        try:
+            others += [self._submit(*common, k, members) for k in range(first + 1, members)]
+            found = run(*arguments)
+            for other in others:
+                other.result()
+        except BaseException:
+            work.counters[GIVE_UP] = 1
+            wait(others)
+            self._work = None
+            raise
+        return found
+
     def _submit(self, *arguments: Any) -> Future[Any]:
         if self._pool is None:
-            self._pool = ThreadPoolExecutor(self.threads - 1, thread_name_prefix="granufab")
+            self._pool = ThreadPoolExecutor(self.wanted - 1, thread_name_prefix="granufab")
         return self._pool.submit(solve, *arguments)
 
     def _slots(self, starts: IntArray, size: int) -> Slots:

@@ -92,6 +92,8 @@ class _Search:
         simulation.search()
         simulation.measure_gaps()
         near = np.flatnonzero(simulation.candidates.gap < REACH * simulation.scales.diameter)
+        if not len(near):
+            return False
         optimum = least_volume(
             _constraints(simulation, near), cost, trust=TRUST, opening=self.opening
         )
@@ -101,6 +103,8 @@ class _Search:
         self.factors += optimum.factors
         self.since += self._kept is not None
         network, force = near[optimum.bearing], optimum.force[optimum.bearing]
+        if not len(network):
+            return False
         force = _balanced(_constraints(simulation, network), cost, force)
         shape = _Shape(simulation)
         residual = _hold(simulation, network, force)

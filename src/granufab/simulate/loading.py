@@ -42,7 +42,7 @@ class Loading:
     def __post_init__(self) -> None:
         dimension = len(self.rate)
         for name, dtype in (("rate", float), ("free", bool), ("stress", float)):
-            value = np.array(getattr(self, name), dtype=dtype)
+            value = np.array(getattr(self, name), dtype=dtype, order="C")
             if value.shape != (dimension, dimension):
                 raise InvalidSettings(
                     f"loading {name} has shape {value.shape}, expected {(dimension, dimension)}"

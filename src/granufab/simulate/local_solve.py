@@ -59,8 +59,8 @@ def solve_local(
     """
     if not 0 < tolerance < 1:
         raise InvalidSettings(f"tolerance is {tolerance!r}, allowed: between 0 and 1")
-    if max_iterations < 1:
-        raise InvalidSettings(f"max_iterations is {max_iterations!r}, must be at least 1")
+    if not isinstance(max_iterations, int | np.integer) or max_iterations < 1:
+        raise InvalidSettings(f"max_iterations is {max_iterations!r}, must be an integer ≥ 1")
     problem = LocalProblem(W=W, q=q, mu=mu, dimension=dimension)
     scaled = ScaledProblem.of(problem)
     search = _Search(scaled, _start(problem, scaled, start), tolerance, max_iterations)
@@ -84,7 +84,10 @@ def _start(problem: LocalProblem, scaled: ScaledProblem, start: Any) -> Array:
     """The scaled starting impulses, on their cones."""
     if start is None:
         return np.zeros_like(scaled.q)
-    given = np.array(start, dtype=float)
+    try:
+        given = np.array(start, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidProblem("start does not consist of numbers") from None
     if given.shape != problem.q.shape or not np.isfinite(given).all():
         raise InvalidProblem(
             f"start has shape {given.shape}, expected {problem.q.shape} finite impulses"

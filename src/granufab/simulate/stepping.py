@@ -7,11 +7,10 @@ is one more body in the solve, so stress-driven components need no controller.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
-from granufab.errors import InvalidPacking, NotConverged
+from granufab.errors import InvalidPacking, InvalidSettings, NotConverged
 from granufab.kernels.impulses import apply_impulses
 from granufab.kernels.motion import (
     accumulate_drift,
@@ -31,28 +30,15 @@ from granufab.simulate.contact_solver import ContactSolver, Solution
 from granufab.simulate.loading import Loading
 from granufab.simulate.scales import Scales
 from granufab.simulate.settings import Material, Solver
+from granufab.simulate.step_report import StepReport
 
-__all__ = ["Simulation", "StepReport"]
+__all__ = ["Simulation"]
 
 MOMENTUM_CAP = 0.9
 ACTIVE_MARGIN = 2e-3
 MISSED_TOLERANCE = 1e-6
 RESOLVES = 3
 OVERLAP_LIMIT = 0.5
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StepReport:
-    """How one step went (see :class:`granufab.history.StepStatistics` for the names)."""
-
-    sweeps: int
-    residual: float
-    residual_contact: float
-    violation: float
-    overlap: float
-    converged: bool
-    contacts: int
-    resolves: int
 
 
 class Simulation:
@@ -103,6 +89,10 @@ class Simulation:
         self.strain = np.zeros((self.dimension, self.dimension))
         self.remap = np.eye(self.dimension, dtype=np.int64)
         self.gravity = np.zeros(self.dimension) if gravity is None else np.asarray(gravity, float)
+        if self.gravity.shape != (self.dimension,):
+            raise InvalidSettings(
+                f"gravity has shape {self.gravity.shape}, expected {(self.dimension,)}"
+            )
         self.rotation = rotation
         self.rate_cap, self.damping = rate_cap, damping
         self.like = (0.0,) * self.dimension
@@ -126,7 +116,17 @@ class Simulation:
         )
 
     def set_loading(self, loading: Loading, *, step: float | None = None) -> None:
-        """Change what drives the cell; impulses are rescaled to the new time step."""
+        """Change what drives the cell; impulses are rescaled to the new time step.
+
+        Raises:
+            InvalidSettings: the loading is for another dimension, or the step is not positive.
+        """
+        if loading.rate.shape != self.matrix.shape:
+            raise InvalidSettings(
+                f"loading is for {len(loading.rate)} dimensions, the packing has {self.dimension}"
+            )
+        if step is not None and not (np.isfinite(step) and step > 0):
+            raise InvalidSettings(f"step is {step!r}, must be > 0")
         free_before = self._free_part(self.rate - loading.rate, loading)
         self.loading = loading
         self.rate = loading.rate + free_before
