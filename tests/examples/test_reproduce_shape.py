@@ -31,7 +31,7 @@ from granufab.reproduce import FIGURES, reproduce
 from granufab.reproduce.case_folder import RUN_FILES
 from granufab.reproduce.out_folder import prepare_out_folder
 from granufab.reproduce.workers import Job, run_jobs
-from granufab.simulate.settings import Case, Sample
+from granufab.simulate.settings import Case, Sample, Stage
 
 FITTED = ("fig5", "fig6", "fig7", "fig8")
 HERE = Path(__file__).parent
@@ -285,14 +285,15 @@ def test_an_unreachable_start_becomes_the_nearest_one_and_is_said(tmp_path: Path
     assert result["paths"][0]["warnings"] == []
 
 
-def test_quick_changes_size_and_rate_and_not_the_tolerance(
+def test_quick_changes_the_size_and_neither_rate_nor_tolerance(
     tmp_path: Path, results: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     quick = reproduce("fig7", quick=True, run_case=synthetic_run, workers=1)
     assert quick["settings"]["grain_count"] == 1000
     cases = quick["settings"]["cases"].values()
-    assert {stage["inertial_number"] for case in cases for stage in case["path"]} == {1e-3}
+    rate = Stage().inertial_number
+    assert {stage["inertial_number"] for case in cases for stage in case["path"]} == {rate}
     assert quick["solver"]["tolerance"] == results["fig7"]["solver"]["tolerance"]
     assert (tmp_path / "granufab-fig7" / "fig7.pdf").stat().st_size > 5000
 

@@ -18,9 +18,7 @@ def reproduce(
         Path | None,
         typer.Option(metavar="DIR", help="Folder; default ./granufab-FIGURE, which is replaced."),
     ] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="1,000 grains a sample at I = 1e-3.")
-    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="1,000 grains a sample.")] = False,
     grains: Annotated[int | None, typer.Option(help="Grains in each sample.")] = None,
     seed: Annotated[int, typer.Option(help="First random seed.")] = 1,
     seeds: Annotated[int, typer.Option(help="Repeat with so many seeds.")] = 1,

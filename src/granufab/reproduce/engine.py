@@ -25,8 +25,6 @@ __all__ = ["FIGURES", "QUICK_GRAINS", "reproduce"]
 
 FIGURES = tuple(f"fig{number}" for number in range(1, 9))
 QUICK_GRAINS = 1000
-QUICK_INERTIAL_NUMBER = 1e-3
-"""Rate of the quick size: quasi-static still, z* lies 0.03 below that of the default rate."""
 
 
 def reproduce(
@@ -51,7 +49,7 @@ def reproduce(
     Args:
         figure: fig1 … fig8, or all.
         out: folder; by default ``./granufab-figN`` (``./granufab-all``), which may be replaced.
-        quick: 1000 grains a sample at I = 10⁻³, at the same solver tolerance.
+        quick: 1000 grains a sample, at the same rate and solver tolerance.
         grains: grains a sample, instead of the figure's own or the quick number.
         seed: of the first sample; with several seeds, the root of independent ones.
         seeds: samples of each path; fits and figures use all of them.
@@ -77,13 +75,7 @@ def reproduce(
     folder = prepare_out_folder(figure, tuple(recipes), out, force=force)
     began = time.perf_counter()
 
-    plan = make_plan(
-        recipes,
-        folder,
-        grain_counts,
-        independent_seeds(seed, seeds),
-        QUICK_INERTIAL_NUMBER if quick else None,
-    )
+    plan = make_plan(recipes, folder, grain_counts, independent_seeds(seed, seeds))
     run_jobs(plan.jobs, workers=workers, progress=progress, run_case=run_case, prepare=prepare)
     results: dict[str, Any] = {}
     failures: list[GranufabError] = []

@@ -34,7 +34,6 @@ def make_plan(
     folder: Path,
     grain_counts: Mapping[str, int],
     seeds: list[int],
-    inertial_number: float | None = None,
 ) -> Plan:
     """Plan the runs of some figures.
 
@@ -47,7 +46,6 @@ def make_plan(
         folder: the runs go to its folder ``runs``.
         grain_counts: grains per sample of each figure.
         seeds: one for each repeat of every path.
-        inertial_number: I of every stage; None is the default rate.
     """
     cases: dict[str, dict[str, list[Case]]] = {}
     names: dict[Case, str] = {}
@@ -56,12 +54,7 @@ def make_plan(
             for path in recipe.paths:
                 name = path.name if len(recipes) == 1 else f"{figure}-{path.name}"
                 name = name if len(seeds) == 1 else f"{name}-s{index + 1}"
-                case = path.case(
-                    grain_count=grain_counts[figure],
-                    seed=seed,
-                    name=" ",
-                    inertial_number=inertial_number,
-                )
+                case = path.case(grain_count=grain_counts[figure], seed=seed, name=" ")
                 names[case] = name
                 cases.setdefault(figure, {}).setdefault(path.name, []).append(case)
     uses = Counter(case.sample for case in names)

@@ -46,16 +46,8 @@ class PathRecipe:
     b: float | None = None
     strains: tuple[float, ...] = (0.3,)
 
-    def case(
-        self,
-        *,
-        grain_count: int,
-        seed: int,
-        name: str | None = None,
-        inertial_number: float | None = None,
-    ) -> Case:
-        """The case to run, at the default solver settings and the default rate unless given."""
-        rate = inertial_number or Stage().inertial_number
+    def case(self, *, grain_count: int, seed: int, name: str | None = None) -> Case:
+        """The case to run, at the default solver settings and the default rate."""
         return Case(
             name=name or self.name,
             sample=Sample(
@@ -66,10 +58,7 @@ class PathRecipe:
                 seed=seed,
             ),
             material=Material(friction=self.friction),
-            path=tuple(
-                Stage(loading=self.loading, strain=e, b=self.b, inertial_number=rate)
-                for e in self.strains
-            ),
+            path=tuple(Stage(loading=self.loading, strain=e, b=self.b) for e in self.strains),
         )
 
 
