@@ -24,7 +24,6 @@ import numpy as np
 import granufab
 from granufab.bench.convergence import PLAIN_CAP, compare_solvers, profile_steps
 from granufab.bench.kernel_speed import (
-    has_threads,
     isotropic_case,
     kernel_speed,
     thread_speed,
@@ -118,8 +117,6 @@ def kernels(bench: Bench) -> list[dict[str, Any]]:
 
 def threads(bench: Bench) -> list[dict[str, Any]]:
     """One thread beside two."""
-    if not has_threads(isotropic_case(1000, 2)):
-        return []
     return [
         thread_speed(isotropic_case(count, 2), repetitions=bench.repetitions)
         for count in (13_000, 200_000)
