@@ -28,7 +28,7 @@ def settings_at(rate: float) -> dict[str, dict[str, float]]:
     step = RATES[rate]
     return {
         "rigid": job(3e-5, INF, rate, step),
-        "k/p = 1e5": job(1e-5, 1e5, rate, step),
+        "k/p = 3e5": job(1e-5, 3e5, rate, step),
         "k/p = 5e4": job(1e-5, 5e4, rate, step),
     }
 
