@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from convergence import INF, SAMPLES, job, means, prepare_sample, run_job
 
-RATES = {1e-3: 2e-5, 2e-4: 1e-5}
+RATES = {1e-3: 2e-5, 2e-4: 4e-6}
 """Largest strain per step by inertial number."""
 
 
