@@ -20,12 +20,13 @@ from granufab.errors import InvalidSettings
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.neighbours import morton_order
 from granufab.kernels.problem import Problem, State
-from granufab.kernels.slots import Slots, fields, pack, schedule, unpack
+from granufab.kernels.slots import Slots, fields, pack, places, schedule, unpack
 from granufab.kernels.solve import CONTROLS, SUMS, Work, solve
 from granufab.kernels.sweep import Law
 from granufab.kernels.team import COUNTERS, GIVE_UP
 from granufab.packing import Array, IntArray
 from granufab.simulate.bodies import aligned
+from granufab.simulate.mending import mend
 
 __all__ = ["ContactSolver", "Packed", "Solution", "thread_count", "wide_by_default"]
 
@@ -35,13 +36,26 @@ TEAMS = 4
 """Chunks are a multiple of this, so that two or four threads have equal shares."""
 
 
+PATIENCE = 150.0
+"""Sweeps without progress before a group is solved together."""
+
+
 class Solution(NamedTuple):
-    """How a solve ended: sweeps, residual, its largest single share, worst −ũ_n [m/s]."""
+    """How a solve ended.
+
+    Attributes:
+        sweeps: Gauss–Seidel sweeps.
+        residual: reached [-].
+        residual_contact: its largest single share [-].
+        violation: worst −ũ_n [m/s].
+        mends: groups of contacts that were solved together.
+    """
 
     sweeps: int
     residual: float
     residual_contact: float
     violation: float
+    mends: int = 0
 
 
 def thread_count() -> int:
@@ -153,10 +167,19 @@ class ContactSolver:
             state: impulses, body records, free rates of the cell.
             settings: (tolerance, max_sweeps, momentum cap, floor), see ``kernels.solve``.
         """
-        packed = self.pack(problem, state)
-        solution = self.iterate(packed, state, settings)
-        unpack(packed.slots, packed.size, packed.order, state.impulse_n, state.impulse_t, self.like)
-        return solution
+        tolerance, most, cap, floor = settings
+        patience = PATIENCE if cap > 0 and problem.softness > 0 else np.inf
+        sweeps = mends = 0
+        while True:
+            packed = self.pack(problem, state)
+            found = self.iterate(packed, state, (tolerance, most - sweeps, cap, floor), patience)
+            unpack(
+                packed.slots, packed.size, packed.order, state.impulse_n, state.impulse_t, self.like
+            )
+            sweeps += found.sweeps
+            if found.residual <= tolerance or sweeps >= most:
+                return found._replace(sweeps=sweeps, mends=mends)
+            mends += mend(problem, state, self._change(packed), mends)
 
     def pack(self, problem: Problem, state: State) -> Packed:
         """The contacts in the order of the sweep; valid until the next call."""
@@ -173,16 +196,43 @@ class ContactSolver:
         pack(problem, state.motion, state.impulse_n, state.impulse_t, order, slots, self.like)
         return Packed(slots, law, order, size)
 
+    def _change(self, packed: Packed) -> Array:
+        """|ΔP| of every contact in the last sweep [N s]."""
+        at, slots = places(self.like), packed.slots
+        batches = int(slots.starts[-1])
+        table = slots.values[: batches * packed.size].reshape(batches, -1, WIDTH)
+        tangents = 1 if self.dimension == 2 else 3
+        change = table[:, at.impulse_n] - table[:, at.before_n]
+        squared = change**2
+        for k in range(tangents):
+            squared += (table[:, at.impulse_t + k] - table[:, at.before_t + k]) ** 2
+        return np.sqrt(squared).ravel()[packed.order]
+
     def iterate(
-        self, packed: Packed, state: State, settings: tuple[float, int, float, float]
+        self,
+        packed: Packed,
+        state: State,
+        settings: tuple[float, int, float, float],
+        patience: float = np.inf,
     ) -> Solution:
-        """Sweep; impulses stay in the packed contacts, velocities and rates in ``state``."""
+        """Sweep; impulses stay in the packed contacts, velocities and rates in ``state``.
+
+        Ends also after ``patience`` sweeps without progress.
+        """
         if self._process != os.getpid():  # a fork has none of its parent's threads
             self._process, self._pool, self._work = os.getpid(), None, None
         work = self._workspace(state.motion)
         work.cells[-1, 0] = state.rate
         like = (self.like,) if self.wide else self.like
-        common = (packed.slots, state.motion, packed.law, work, like, packed.size, settings)
+        common = (
+            packed.slots,
+            state.motion,
+            packed.law,
+            work,
+            like,
+            packed.size,
+            (*settings, patience),
+        )
         run: Any = self._together if self.threads > 1 else solve
         found = run(*common, 0, self.threads)
         state.rate[:] = work.cells[-1, 0]
