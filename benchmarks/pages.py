@@ -8,22 +8,9 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 BEGIN, END = "<!-- measured table: {name} -->", "<!-- end of {name} -->"
-
-# κ, axial rate, grains, z, z_backbone, a: LAMMPS, pair gran/hooke/history, same job, one seed
-LAMMPS = (
-    ("1e3", "1e-3", 2000, 3.14, 3.39, 0.261),
-    ("1e3", "1e-3", 5000, 3.15, 3.39, 0.246),
-    ("1e4", "1e-3", 2000, 2.89, 3.22, 0.311),
-    ("1e4", "1e-3", 5000, 2.89, 3.22, 0.288),
-    ("1e4", "1e-4", 1000, 2.94, 3.285, 0.294),
-    ("1e5", "1e-4", 1000, 2.81, 3.214, 0.299),
-)
 
 
 def insert(page: str, name: str, table: str) -> None:
@@ -37,45 +24,13 @@ def insert(page: str, name: str, table: str) -> None:
 
 
 def peers(folder: Path) -> None:
-    """Our biaxial runs beside LAMMPS'."""
-    runs: dict[tuple[str, float, int], list[dict[str, Any]]] = {}
-    for path in sorted(folder.glob("N*.json")):
-        data = json.loads(path.read_text())
-        runs.setdefault((data["kappa"], data["axial_rate"], data["grains"]), []).append(data)
-    names = ("z", "z_backbone", "rattler_fraction", "a", "a_signed", "q_over_p")
-    rows = []
-    for (kappa, rate, grains), mine in sorted(
-        runs.items(), key=lambda r: (r[0][1], float(r[0][0]))
-    ):
-        row: dict[str, Any] = {"kappa": kappa, "axial_rate": rate, "grains": grains}
-        row["seeds"] = len(mine)
-        for name in names:
-            values = np.array([run[name] for run in mine])
-            row[name] = [float(values.mean()), float(np.ptp(values)) / 2]
-        row["unconverged"] = max(run["unconverged"] for run in mine)
-        row["sweeps"] = float(np.mean([run["sweeps"] for run in mine]))
-        rows.append(row)
-    (DOCS / "peers.json").write_text(json.dumps(rows, indent=1))
-    lines = [
-        "| program | disks | κ | axial I | z | z_backbone | rattlers | a | q/p | unconverged |",
-        "|" + "---|" * 10,
-    ]
-    for row in rows:
-        cells = [f"{row[n][0]:.3f} ± {row[n][1]:.3f}" for n in ("z", "z_backbone")]
-        cells += [f"{100 * row['rattler_fraction'][0]:.1f} %"]
-        cells += [f"{row[n][0]:.3f} ± {row[n][1]:.3f}" for n in ("a", "q_over_p")]
-        kappa = "rigid" if row["kappa"] == "inf" else f"{float(row['kappa']):.0e}"
-        lines.append(
-            f"| granufab | {row['grains']} | {kappa} | {row['axial_rate']:.0e} | "
-            + " | ".join(cells)
-            + f" | {100 * row['unconverged']:.2f} % |"
-        )
-    for kappa, rate, grains, z, backbone, a in LAMMPS:
-        lines.append(
-            f"| LAMMPS | {grains} | {kappa} | {rate} | {z} | {backbone} | "
-            f"{100 * (1 - z / backbone):.1f} % | {a} | – | – |"
-        )
-    insert("peers.md", "peers", "\n".join(lines))
+    """The biaxial job by LAMMPS and by granufab."""
+    sys.path.insert(0, str(Path(__file__).resolve().parent / "peers"))
+    from peers_table import report
+
+    data = json.loads((folder / "peers.json").read_text())
+    (DOCS / "peers.json").write_text(json.dumps(data, indent=1) + "\n")
+    insert("peers.md", "peers", report(data["rows"], data["kappas"]))
 
 
 def critical(folder: Path) -> None:

@@ -14,16 +14,17 @@ import json
 import math
 import os
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 os.environ["GRANUFAB_THREADS"] = "1"
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from granufab_run import Choice, run_granufab  # noqa: E402
-from job import Job, run_once, start_of  # noqa: E402
-from lammps_run import MISSING, find_lammps, run_lammps  # noqa: E402
-from table import table  # noqa: E402
+from biaxial_job import Job, Start, run_once, start_of
+from granufab_run import Choice, run_granufab
+from lammps_run import MISSING, find_lammps, run_lammps
+from peers_table import report
 
 Task = tuple[Path, Callable[[], dict[str, Any]]]
 
@@ -55,8 +56,9 @@ def choices_of(given: argparse.Namespace) -> Iterator[tuple[str, Choice]]:
 
     if not given.no_default:
         usual = Solver()
-        yield "default", Choice(
-            kappa=usual.stiffness, residual=usual.tolerance, time_step=usual.time_step
+        yield (
+            "default",
+            Choice(kappa=usual.stiffness, residual=usual.tolerance, time_step=usual.time_step),
         )
     for kappa in given.kappa if given.stiffness is None else given.stiffness:
         for residual in given.residuals:
@@ -65,27 +67,34 @@ def choices_of(given: argparse.Namespace) -> Iterator[tuple[str, Choice]]:
 
 
 def tasks_of(given: argparse.Namespace, executable: Path | None) -> Iterator[Task]:
-    """Every row asked for, the two programs in turn for each seed."""
+    """Every row asked for; LAMMPS' in the middle of granufab's, so that the load is shared."""
     for seed in given.seeds:
         job = Job(grains=given.grains, rate=given.rate, strain=given.strain, seed=seed)
         start = start_of(job, given.out)
-        theirs: list[Task] = []
-        if executable is not None and "lammps" in given.programs:
-            for kappa in given.kappa:
-                path = given.out / f"row-{job.name}-lammps-k{kappa:g}-t{given.tangential:g}.json"
-                theirs.append(
-                    (path, lambda k=kappa: run_lammps(executable, job, start, k, given.tangential))
-                )
-        ours: list[Task] = []
-        if "granufab" in given.programs:
-            for role, choice in choices_of(given):
-                path = given.out / f"row-{job.name}-granufab-{role}{choice.name}.json"
-                ours.append(
-                    (path, lambda c=choice, r=role: {**run_granufab(job, start, c), "role": r})
-                )
-        yield from ours[: len(ours) // 2]
-        yield from theirs
-        yield from ours[len(ours) // 2 :]
+        theirs = [] if executable is None else list(lammps_tasks(given, executable, job, start))
+        ours = list(granufab_tasks(given, job, start))
+        half = len(ours) // 2
+        yield from (*ours[:half], *theirs, *ours[half:])
+
+
+def lammps_tasks(
+    given: argparse.Namespace, executable: Path, job: Job, start: Start
+) -> Iterator[Task]:
+    """One task for each stiffness."""
+    if "lammps" not in given.programs:
+        return
+    for kappa in given.kappa:
+        path = given.out / f"row-{job.name}-lammps-k{kappa:g}-t{given.tangential:g}.json"
+        yield path, partial(run_lammps, executable, job, start, kappa, given.tangential)
+
+
+def granufab_tasks(given: argparse.Namespace, job: Job, start: Start) -> Iterator[Task]:
+    """One task for each choice of settings."""
+    if "granufab" not in given.programs:
+        return
+    for role, choice in choices_of(given):
+        path = given.out / f"row-{job.name}-granufab-{role}{choice.name}.json"
+        yield path, partial(run_granufab, job, start, choice, role=role)
 
 
 def pin(core: int | None) -> int | None:
@@ -107,17 +116,10 @@ def write(out: Path, kappas: Sequence[float]) -> str:
     from granufab.io import provenance
 
     rows = all_rows(out)
-    jobs = sorted({(row["grains"], row["rate"], row["strain"]) for row in rows})
-    (out / "peers.json").write_text(json.dumps({"machine": provenance(), "rows": rows}, indent=1))
-    parts = []
-    for grains, rate, strain in jobs:
-        same = [r for r in rows if (r["grains"], r["rate"], r["strain"]) == (grains, rate, strain)]
-        walked = sum(row["eps_q_end"] for row in same) / len(same)
-        parts.append(
-            f"{grains} disks, axial I = {rate:g} (I_q ≈ {2 * rate:g}), ε_1 to {strain:g} "
-            f"(ε_q to {walked:.2f})\n\n" + table(same, kappas)
-        )
-    text = "\n\n".join(parts)
+    (out / "peers.json").write_text(
+        json.dumps({"machine": provenance(), "kappas": list(kappas), "rows": rows}, indent=1)
+    )
+    text = report(rows, kappas)
     (out / "peers.md").write_text(text + "\n")
     return text
 

