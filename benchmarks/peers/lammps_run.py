@@ -47,7 +47,7 @@ def environment(executable: Path) -> dict[str, str]:
 
 
 def read_contacts(path: Path) -> Iterator[NDArray[np.float64]]:
-    """Frames of a ``dump local`` file, one array (contact_count, columns) each."""
+    """Frames of a ``dump local`` file, one array (contact_count, 5) each."""
     count = 0
     with path.open() as lines:
         for line in lines:
@@ -55,7 +55,7 @@ def read_contacts(path: Path) -> Iterator[NDArray[np.float64]]:
                 count = int(next(lines))
             elif line.startswith("ITEM: ENTRIES"):
                 rows = [next(lines).split() for _ in range(count)]
-                yield np.array(rows, dtype=float).reshape(count, -1)
+                yield np.array(rows, dtype=float).reshape(count, 5)
 
 
 def measure_contacts(frame: NDArray[np.float64], grains: int) -> dict[str, float]:
