@@ -223,10 +223,14 @@ def test_lammps_and_granufab_agree_on_a_short_job(tmp_path: Path) -> None:
     executable = lammps_run.find_lammps()
     if executable is None:
         pytest.skip(lammps_run.MISSING)
-    job = Job(grains=300, rate=1e-3, strain=0.05, states=50)
-    start = start_of(job, tmp_path)
-    theirs = lammps_run.run_lammps(executable, job, start, 1e3)
-    ours = run_granufab(job, start, Choice(kappa=1e3, residual=1e-5, time_step=0.05))
+    pairs = []
+    for seed in (1, 2, 3):
+        job = Job(grains=300, rate=1e-3, strain=0.05, states=50, seed=seed)
+        start = start_of(job, tmp_path)
+        ours = run_granufab(job, start, Choice(kappa=1e3, residual=1e-5, time_step=0.05))
+        pairs.append((lammps_run.run_lammps(executable, job, start, 1e3), ours))
+    names = ("lateral_stress", "z_backbone", "a_signed", "phi")
+    theirs, ours = ({k: np.mean([p[side][k] for p in pairs]) for k in names} for side in (0, 1))
     assert theirs["lateral_stress"] == pytest.approx(1.0, abs=0.1)
     assert theirs["z_backbone"] == pytest.approx(ours["z_backbone"], abs=0.1)
     assert theirs["a_signed"] == pytest.approx(ours["a_signed"], abs=0.12)
