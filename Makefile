@@ -1,7 +1,7 @@
 PYTHON ?= python
 BENCH_OUT ?= build/benchmarks
 
-.PHONY: check test slow bench docs format
+.PHONY: check test slow bench peers docs format
 
 check:
 	$(PYTHON) -m ruff check src tests
@@ -17,6 +17,9 @@ slow:
 
 bench:
 	$(PYTHON) benchmarks/suite.py $(BENCH_OUT)
+
+peers:
+	$(PYTHON) benchmarks/peers --out $(BENCH_OUT)/peers
 
 docs:
 	$(PYTHON) docs/write_api.py

@@ -44,6 +44,7 @@ def arguments(words: Sequence[str] | None = None) -> argparse.Namespace:
     add("--time-steps", type=float, nargs="*", default=[0.05], help="granufab's, in √(<m>/σ)")
     add("--no-default", action="store_true", help="leave out granufab's default settings")
     add("--tangential", type=float, default=1.0, help="LAMMPS' k_t/k_n (granufab's is 1)")
+    add("--again", action="store_true", help="time rows once more, keep the least CPU seconds")
     add("--lammps", help="LAMMPS executable")
     add("--core", type=int, help="processor to run on (default: the last allowed one)")
     return parser.parse_args(words)
@@ -123,10 +124,10 @@ def write(out: Path, kappas: Sequence[float]) -> str:
     return text
 
 
-def run_task(path: Path, make: Callable[[], dict[str, Any]]) -> bool:
+def run_task(path: Path, make: Callable[[], dict[str, Any]], *, again: bool) -> bool:
     """Run one row and print it; a program that fails is named in one line."""
     try:
-        row = run_once(path, make)
+        row = run_once(path, make, again=again)
     except (subprocess.CalledProcessError, ValueError) as error:
         print(f"{path.stem}: failed: {error}", flush=True)
         return False
@@ -148,7 +149,7 @@ def main(words: Sequence[str] | None = None) -> int:
     if executable is None and "lammps" in given.programs:
         print(MISSING)
     print(f"on processor {pin(given.core)}", flush=True)
-    done = [run_task(path, make) for path, make in tasks_of(given, executable)]
+    done = [run_task(path, make, again=given.again) for path, make in tasks_of(given, executable)]
     print(write(given.out, given.kappa))
     return 0 if all(done) else 1
 

@@ -76,7 +76,7 @@ def table(rows: Sequence[Row], references: Sequence[float] = ()) -> str:
     theirs = [(k, g) for k in references for g in groups if _is_lammps(g[0], k)]
     names = [
         "program", "κ", "residual", "h", "seeds", "z_backbone", "z", "rattlers", "a", "q/p",
-        "σ_lateral", "sweeps", "capped", "CPU s", "wall s", "load",
+        "σ_lateral", "sweeps", "capped", "CPU s", "timed", "wall s", "load",
     ]  # fmt: skip
     names += [f"Δz, speed against LAMMPS {_kappa(k)}" for k, _ in theirs]
     lines = ["| " + " | ".join(names) + " |", "|" + "---|" * len(names)]
@@ -125,7 +125,8 @@ def _costs(rows: Sequence[Row]) -> list[str]:
     capped = "–" if capped is None else f"{100 * np.mean([r['unconverged'] for r in rows]):.2f} %"
     wall = float(np.mean([row["seconds"] for row in rows]))
     load = float(np.mean([row["load_before"] for row in rows]))
-    return [sweeps, capped, f"{seconds_of(rows):.3g}", f"{wall:.3g}", f"{load:.1f}"]
+    timed = "/".join(str(len(row["timings"])) for row in rows)
+    return [sweeps, capped, f"{seconds_of(rows):.3g}", timed, f"{wall:.3g}", f"{load:.1f}"]
 
 
 def _against(reference: Sequence[Row], rows: Sequence[Row]) -> str:

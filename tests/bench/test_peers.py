@@ -20,7 +20,7 @@ sys.path.insert(0, str(FOLDER))
 import lammps_run  # noqa: E402
 import lammps_script  # noqa: E402
 import peers_table  # noqa: E402
-from biaxial_job import Job, Start, late_means, start_of  # noqa: E402
+from biaxial_job import Job, Start, late_means, run_once, start_of  # noqa: E402
 from granufab_run import Choice, run_granufab  # noqa: E402
 
 
@@ -163,6 +163,21 @@ def test_means_are_taken_late() -> None:
         late_means(rows, Job(strain=1.0))
 
 
+def test_a_row_timed_again_keeps_its_least_cpu_seconds(tmp_path: Path) -> None:
+    path = tmp_path / "row.json"
+    seconds = iter((3.0, 2.0, 4.0))
+
+    def make() -> dict[str, Any]:
+        return {"cpu_seconds": next(seconds)}
+
+    assert run_once(path, make)["timings"] == [3.0]
+    assert run_once(path, make)["timings"] == [3.0]  # kept, not run
+    run_once(path, make, again=True)
+    row = run_once(path, make, again=True)
+    assert (row["cpu_seconds"], row["timings"]) == (2.0, [3.0, 2.0, 4.0])
+    assert run_once(path, make) == row
+
+
 def _row(program: str, kappa: float | str, seed: int, seconds: float, z: float) -> dict[str, Any]:
     ours = program == "granufab"
     return {
@@ -171,6 +186,7 @@ def _row(program: str, kappa: float | str, seed: int, seconds: float, z: float) 
         "unconverged": 0.0 if ours else None, "z_backbone": z, "z": z - 0.4, "a": 0.25,
         "rattler_fraction": 0.1, "q_over_p": 0.3, "lateral_stress": 1.0, "lateral_scatter": 0.01,
         "cpu_seconds": seconds, "seconds": 2 * seconds, "load_before": 1.0, "eps_q_end": 0.42,
+        "timings": [seconds],
     }  # fmt: skip
 
 
