@@ -30,7 +30,11 @@ def peers(folder: Path) -> None:
 
     data = json.loads((folder / "peers.json").read_text())
     (DOCS / "peers.json").write_text(json.dumps(data, indent=1) + "\n")
-    insert("peers.md", "peers", report(data["rows"], data["kappas"]))
+    machine = data["machine"]
+    theirs = sorted({row["version"] for row in data["rows"] if row["program"] == "LAMMPS"})
+    on = f"One core of {machine['cpu']}; Python {machine['python']}, numba {machine['numba']}; "
+    text = on + ", ".join(theirs) + ".\n\n" + report(data["rows"], data["kappas"])
+    insert("peers.md", "peers", text)
 
 
 def critical(folder: Path) -> None:
