@@ -25,7 +25,7 @@ from granufab.kernels.vectors import (
     tangential,
 )
 
-__all__ = ["apply_impulses", "local_velocity"]
+__all__ = ["apply_listed", "local_velocity"]
 
 
 @kernel
@@ -43,12 +43,20 @@ def local_velocity(problem: Problem, motion, rate, c, like):
 
 
 @kernel
-def apply_impulses(problem: Problem, state: State, like):
-    """Add M⁻¹ H P of every contact to motion and rate, which hold the free velocities."""
-    motion, rate = state.motion, state.rate
+def apply_listed(problem: Problem, state: State, listed, reach, rate, like):
+    """Add M⁻¹ H P of some contacts to the velocities of the bodies and to ``rate``.
+
+    Args:
+        problem, state: contacts, their impulses, velocities.
+        listed, reach: contacts listed[reach[0]:reach[1]].
+        rate: free rates of the cell [1/s], shape (D, D).
+        like: tuple of D zeros.
+    """
+    motion = state.motion
     pushed, weight = address(rate), address(problem.weight)
     dilation = 0.0
-    for c in range(len(problem.length)):
+    for at in range(reach[0], reach[1]):
+        c = listed[at]
         i, j = problem.first[c], problem.second[c]
         n = load(problem.normal, c, like)
         p_n, p_t = state.impulse_n[c], load_tangent(state.impulse_t, c, like)

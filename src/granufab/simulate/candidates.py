@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from granufab.kernels.motion import measure_gaps, turn_tangents
+from granufab.kernels.geometry import measure_gaps, turn_tangents
 from granufab.kernels.neighbours import find_pairs, find_wall_pairs
+from granufab.kernels.step_arrays import Pairs
 from granufab.packing import Array, Contacts, IntArray, WallContacts
 
 __all__ = ["Candidates"]
@@ -112,12 +113,20 @@ class Candidates:
         like: tuple[float, ...],
     ) -> None:
         """Normals, lengths and gaps at the present positions; impulses turn with the normals."""
+        everything = (0, self.count)
         measure_gaps(
-            position, radius, matrix, origin, self.pairs, self.images, self.grain_count,
-            self.normal, self.length, self.gap,
+            position, radius, matrix, origin, self.pairs, self.images,
+            self.normal, self.length, self.gap, everything, like,
         )  # fmt: skip
         if self.dimension == 3:
-            turn_tangents(self.impulse_t, self.normal, like)
+            turn_tangents(self.impulse_t, self.normal, everything, like)
+
+    def arrays(self) -> Pairs:
+        """The candidates, for kernels; valid until the next search."""
+        return Pairs(
+            self.pairs, self.images, self.normal, self.length, self.gap, self.active,
+            self.impulse_n, self.impulse_t, self.memory_t, self.friction,
+        )  # fmt: skip
 
     def impulses(self) -> Array:
         """P of every candidate in global axes [N s], shape (count, D)."""
@@ -129,17 +138,6 @@ class Candidates:
     def virial(self) -> Array:
         """Σ P⊗ℓ over all candidates [N m s], shape (D, D)."""
         return self.impulses().T @ (self.normal * self.length[:, None])
-
-    def remember_tangents(self) -> None:
-        """Keep the tangential impulses the step began with: the springs' memory."""
-        self.memory_t[:] = self.impulse_t
-
-    def keep_impulses(self, chosen: IntArray, impulse_n: Array, impulse_t: Array) -> None:
-        """Take the solved impulses; pairs outside the solve carry none."""
-        self.impulse_n[:] = 0.0
-        self.impulse_t[:] = 0.0
-        self.impulse_n[chosen] = impulse_n
-        self.impulse_t[chosen] = impulse_t
 
     def shear_images(self, flow: int, axis: int, turns: int) -> None:
         """Rewrite images after lattice vector ``axis`` lost ``turns`` of vector ``flow``."""

@@ -7,27 +7,25 @@ the result has the same bits for any number of threads.
 from __future__ import annotations
 
 import os
-import sys
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import binding
 from numba.core import config
 
-from granufab.errors import InvalidSettings
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.neighbours import morton_order
+from granufab.kernels.pack import pack, unpack
 from granufab.kernels.problem import Problem, State
-from granufab.kernels.slots import Slots, fields, pack, schedule, unpack
+from granufab.kernels.schedule import Plan, schedule
+from granufab.kernels.slots import Slots, fields
 from granufab.kernels.solve import CONTROLS, SUMS, Work, solve
 from granufab.kernels.sweep import Law
-from granufab.kernels.team import COUNTERS, GIVE_UP
 from granufab.packing import Array, IntArray
 from granufab.simulate.bodies import aligned
+from granufab.simulate.team import Team, thread_count
 
-__all__ = ["ContactSolver", "Packed", "Solution", "thread_count", "wide_by_default"]
+__all__ = ["ContactSolver", "Packed", "Solution", "wide_by_default"]
 
 CHUNK_GRAINS, MOST_CHUNKS = 3000, 64
 """Grains for one chunk; from twice as many on the number of chunks is rounded up to ``TEAMS``."""
@@ -44,36 +42,6 @@ class Solution(NamedTuple):
     violation: float
 
 
-def thread_count() -> int:
-    """Threads of a run: GRANUFAB_THREADS, else the processors this process may use.
-
-    Teams wait actively, so the default is 1 where a waiting thread cannot give its processor
-    away (not POSIX) and at most what a container is allowed.
-
-    Raises:
-        InvalidSettings: GRANUFAB_THREADS is not a positive integer.
-    """
-    given = os.environ.get("GRANUFAB_THREADS")
-    if not given:
-        if os.name != "posix":
-            return 1
-        usable = getattr(os, "sched_getaffinity", None)
-        count = len(usable(0)) if usable else os.cpu_count() or 1
-        return max(1, min(count, _quota()))
-    if not given.isdecimal() or int(given) < 1:
-        raise InvalidSettings(f"GRANUFAB_THREADS is {given!r}, must be an integer ≥ 1")
-    return int(given)
-
-
-def _quota() -> int:
-    """Processors that the control group of this process may use, rounded up."""
-    try:
-        allowed, period = Path("/sys/fs/cgroup/cpu.max").read_text().split()
-        return -(-int(allowed) // int(period))
-    except (OSError, ValueError):  # no such file, or no limit ("max")
-        return sys.maxsize
-
-
 def wide_by_default() -> bool:
     """Whether eight contacts are updated at once: where the processor has vectors of four doubles.
 
@@ -85,11 +53,11 @@ def wide_by_default() -> bool:
 
 
 class Packed(NamedTuple):
-    """A packed problem: contacts, shared law, slot of every contact, numbers of a batch."""
+    """A packed problem: contacts, shared law, where they lie, numbers of a batch."""
 
     slots: Slots
     law: Law
-    order: IntArray
+    plan: Plan
     size: int
 
 
@@ -99,7 +67,7 @@ class ContactSolver:
     Args:
         grain_count: grains; bodies beyond are walls and the spare one.
         dimension: 2 or 3.
-        threads: most threads to use; default :func:`thread_count`.
+        threads: most threads to use; default :func:`granufab.simulate.team.thread_count`.
         wide: update eight contacts at once; default :func:`wide_by_default`.
     """
 
@@ -113,24 +81,28 @@ class ContactSolver:
     ) -> None:
         self.grain_count, self.dimension = grain_count, dimension
         self.like = (0.0,) * dimension
-        self.wanted = 1 if getattr(config, "DISABLE_JIT", 0) else threads or thread_count()
+        self.team = Team(1 if getattr(config, "DISABLE_JIT", 0) else threads or thread_count())
         self.wide = wide_by_default() if wide is None else wide
         self.chunk = np.zeros(grain_count, np.int64)
         teams = -(-(grain_count // CHUNK_GRAINS) // TEAMS)
         self.divide(min(MOST_CHUNKS, TEAMS * teams) if grain_count >= 2 * CHUNK_GRAINS else 1)
-        self._pool: ThreadPoolExecutor | None = None
-        self._process = os.getpid()
-        self._values, self._index = aligned((0,)), np.zeros((2, 0), np.uint32)
+        self._values, self._first, self._second = aligned((0,)), _indices(0), _indices(0)
+        self._plan: Plan | None = None
         self._work: Work | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but memory that is made again when needed."""
+        return {**self.__dict__, "_plan": None, "_work": None}
 
     @property
     def threads(self) -> int:
         """Threads that share a solve: as many as wanted, at most one for each chunk."""
-        return min(self.wanted, self.chunk_count)
+        return min(self.team.most, self.chunk_count)
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but threads and what they share, which are made again when needed."""
-        return {**self.__dict__, "_pool": None, "_work": None}
+    @property
+    def width(self) -> tuple[Any, ...]:
+        """Width and dimension of the sweep, as kernels are told."""
+        return (self.like,) if self.wide else self.like
 
     def arrange(self, position: Array, matrix: Array, origin: Array) -> None:
         """Divide the grains into chunks that lie together."""
@@ -155,7 +127,7 @@ class ContactSolver:
         """
         packed = self.pack(problem, state)
         solution = self.iterate(packed, state, settings)
-        unpack(packed.slots, packed.size, packed.order, state.impulse_n, state.impulse_t, self.like)
+        unpack(packed.slots, packed.plan, packed.size, state, self.like)
         return solution
 
     def pack(self, problem: Problem, state: State) -> Packed:
@@ -164,70 +136,61 @@ class ContactSolver:
             problem.softness, problem.spin_factor, problem.coupled,
             problem.dilation_weight, problem.weight,
         )  # fmt: skip
-        order = np.empty(len(problem.length), np.int64)
-        starts = schedule(
-            problem.first, problem.second, self.grain_count, self.chunk, self.chunk_count, order
-        )
-        size = fields(self.like, problem.coupled) * WIDTH
-        slots = self._slots(starts, size)
-        pack(problem, state.motion, state.impulse_n, state.impulse_t, order, slots, self.like)
-        return Packed(slots, law, order, size)
+        plan = self.plan(len(problem.length))
+        batches = schedule(plan, problem.first, problem.second)
+        slots = self.slots(batches, coupled=problem.coupled)
+        pack(problem, state, plan, slots, self.like)
+        return Packed(slots, law, plan, fields(self.like, problem.coupled) * WIDTH)
 
     def iterate(
         self, packed: Packed, state: State, settings: tuple[float, int, float, float]
     ) -> Solution:
         """Sweep; impulses stay in the packed contacts, velocities and rates in ``state``."""
-        if self._process != os.getpid():  # a fork has none of its parent's threads
-            self._process, self._pool, self._work = os.getpid(), None, None
-        work = self._workspace(state.motion)
+        work = self.work(state.motion)
         work.cells[-1, 0] = state.rate
-        like = (self.like,) if self.wide else self.like
-        common = (packed.slots, state.motion, packed.law, work, like, packed.size, settings)
-        run: Any = self._together if self.threads > 1 else solve
-        found = run(*common, 0, self.threads)
+        arguments = (packed.slots, state.motion, packed.law, work, self.width, packed.size, settings)
+        found = self.team.run(solve, arguments, self.threads)
         state.rate[:] = work.cells[-1, 0]
         return Solution(*found)
 
-    def _together(self, *arguments: Any) -> Any:
-        """Solve with all threads; if one fails the others end, and the next solve starts afresh."""
-        *common, first, members = arguments
-        work: Work = common[3]
-        others: list[Future[Any]] = []
-        run: Any = solve
-        try:
-            others += [self._submit(*common, k, members) for k in range(first + 1, members)]
-            found = run(*arguments)
-            for other in others:
-                other.result()
-        except BaseException:
-            work.counters[GIVE_UP] = 1
-            wait(others)
-            self._work = None
-            raise
-        return found
+    def plan(self, contact_count: int) -> Plan:
+        """Memory to arrange at least so many contacts, for the present chunks."""
+        plan, chunks = self._plan, self.chunk_count
+        if plan is None or len(plan.listed) < contact_count or len(plan.heads) != chunks + 2:
+            plan = self._plan = Plan.of(self.chunk, chunks, contact_count * 5 // 4)
+        return plan
 
-    def _submit(self, *arguments: Any) -> Future[Any]:
-        if self._pool is None:
-            self._pool = ThreadPoolExecutor(self.wanted - 1, thread_name_prefix="granufab")
-        return self._pool.submit(solve, *arguments)
-
-    def _slots(self, starts: IntArray, size: int) -> Slots:
-        batches = int(starts[-1])
+    def slots(self, batches: int, *, coupled: bool) -> Slots:
+        """Room for so many batches; the contacts packed before are lost where it grows."""
+        size = fields(self.like, coupled) * WIDTH
         if len(self._values) < batches * size:
             self._values = aligned((batches * size * 5 // 4 + size,))
-        if self._index.shape[1] < batches * WIDTH:
-            self._index = np.zeros((2, batches * WIDTH * 5 // 4 + WIDTH), np.uint32)
-        return Slots(self._values, self._index[0], self._index[1], starts)
+        if len(self._first) < batches * WIDTH:
+            room = batches * WIDTH * 5 // 4 + WIDTH
+            self._first, self._second = _indices(room), _indices(room)
+        return Slots(self._values, self._first, self._second, self.plan(0).starts)
 
-    def _workspace(self, bodies: Array) -> Work:
-        if self._work is None or len(self._work.sums) != self.chunk_count + 1:
-            dimension, chunks = self.dimension, self.chunk_count
-            self._work = Work(
+    def room(self, *, coupled: bool) -> int:
+        """Batches that the slots have room for."""
+        size = fields(self.like, coupled) * WIDTH
+        return min(len(self._values) // size, len(self._first) // WIDTH)
+
+    def work(self, bodies: Array) -> Work:
+        """Memory of the team that solves."""
+        counters = self.team.ready()
+        work, dimension, chunks = self._work, self.dimension, self.chunk_count
+        if work is None or len(work.sums) != chunks + 1 or len(work.before) != len(bodies):
+            work = Work(
                 before=aligned(bodies.shape),
                 cells=np.zeros((chunks + 1, 3, dimension, dimension)),
                 rate_before=np.zeros((dimension, dimension)),
                 sums=np.zeros((chunks + 1, SUMS)),
                 control=np.zeros(CONTROLS),
-                counters=np.zeros(COUNTERS, np.int64),
+                counters=counters,
             )
+        self._work = work._replace(counters=counters)
         return self._work
+
+
+def _indices(count: int) -> np.ndarray:
+    return np.zeros(count, np.uint32)
