@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from granufab.kernels.access import address
 from granufab.kernels.cell import add_outer
-from granufab.kernels.options import kernel
+from granufab.kernels.options import kernel, part
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.vectors import (
     add,
@@ -28,7 +28,7 @@ from granufab.kernels.vectors import (
 __all__ = ["apply_impulses", "local_velocity"]
 
 
-@kernel
+@part
 def local_velocity(problem: Problem, motion, rate, c, like):
     """(u_n, u_t) of contact c without offsets: grains and free cell rates only [m/s]."""
     i, j = problem.first[c], problem.second[c]

@@ -15,14 +15,11 @@ from typing import Any, TypeVar
 
 from numba import extending, njit
 from numba.core import config
-from numba.extending import overload
 
-__all__ = ["ARITHMETIC", "cache_folder", "compiled", "inlined", "intrinsic", "kernel"]
+__all__ = ["ARITHMETIC", "cache_folder", "inlined", "intrinsic", "kernel", "part"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 ARITHMETIC: dict[str, Any] = {"fastmath": {"contract", "nsz", "nnan"}, "error_model": "numpy"}
-
-_INLINED: dict[str, Any] = {**ARITHMETIC, "forceinline": True}
 
 
 def cache_folder() -> str:
@@ -52,20 +49,23 @@ config.CACHE_DIR = cache_folder()  # type: ignore[attr-defined]
 
 def kernel(function: F) -> F:
     """Compile ``function`` with the package's options, cached on disk, releasing the GIL."""
-    compiled: Any = njit(cache=True, nogil=True, **ARITHMETIC)(function)
+    compiled: Any = njit(cache=True, nogil=True, no_cfunc_wrapper=True, **ARITHMETIC)(function)
     return compiled
+
+
+def part(function: F) -> F:
+    """Compile ``function`` where kernels call it; called from Python it stays plain text."""
+    return _part(**ARITHMETIC)(function)
 
 
 def inlined(function: F) -> F:
-    """Compile ``function`` as a part of the kernels that call it."""
-    compiled: Any = njit(nogil=True, **_INLINED)(function)
-    return compiled
+    """Compile ``function`` into the kernels that call it; called from Python it stays plain text."""
+    return _part(**ARITHMETIC, forceinline=True)(function)
 
 
-def compiled(function: Callable[..., Any]) -> Callable[[F], F]:
-    """The decorated function chooses, by types, the text that kernels inline for ``function``."""
-    choose: Any = overload
-    return choose(function, jit_options=_INLINED)
+def _part(**options: Any) -> Any:
+    register: Any = extending.register_jitable
+    return register(no_cfunc_wrapper=True, nogil=True, **options)
 
 
 intrinsic: Any = extending.intrinsic

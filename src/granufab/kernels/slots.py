@@ -15,8 +15,9 @@ import numpy as np
 from granufab.kernels.access import address
 from granufab.kernels.cell import cell_weight
 from granufab.kernels.lanes import WIDTH
-from granufab.kernels.options import compiled, kernel
+from granufab.kernels.options import kernel, part
 from granufab.kernels.problem import Problem
+from granufab.kernels.tracing import traced
 from granufab.kernels.vectors import inverse_mass, load
 
 __all__ = ["Slots", "fields", "pack", "places", "schedule", "unpack"]
@@ -62,6 +63,7 @@ class Places(NamedTuple):
     cross: int
 
 
+@traced
 def places(like):
     """Where the fields begin; ``like`` is a tuple of D zeros, numbers or lanes."""
     return (
@@ -69,13 +71,6 @@ def places(like):
         if len(like) == 2
         else Places(0, 3, 4, 5, 8, 9, 10, 11, 12, 15, 16, 19)
     )
-
-
-@compiled(places)
-def _places(like):
-    if like.count == 2:
-        return lambda like: Places(0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12)
-    return lambda like: Places(0, 3, 4, 5, 8, 9, 10, 11, 12, 15, 16, 19)
 
 
 @kernel
@@ -139,7 +134,7 @@ def schedule(first, second, grain_count, chunk, chunk_count, order):
     return starts
 
 
-@kernel
+@part
 def _mixed(at, head, end):
     """Visit each block in leaps: contacts in a row share grains and would have to queue."""
     start = head + (at - head) // BLOCK * BLOCK
@@ -147,7 +142,7 @@ def _mixed(at, head, end):
     return start + (at - start) * LEAP % size
 
 
-@kernel
+@part
 def _home(chunk, i, j, grain_count, chunk_count):
     """Chunk of a contact, or chunk_count for one between chunks."""
     if j >= grain_count or chunk[i] == chunk[j]:
@@ -199,7 +194,7 @@ def pack(problem: Problem, motion, impulse_n, impulse_t, order, slots: Slots, li
     _fill_empty(slots, size, at, spare)
 
 
-@kernel
+@part
 def _fill_empty(slots: Slots, size, at, spare):
     for slot in range(slots.starts[-1] * WIDTH):
         if slots.first[slot] == spare:
