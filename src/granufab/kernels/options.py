@@ -15,6 +15,8 @@ from typing import Any, TypeVar
 
 from numba import extending, njit
 from numba.core import config
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 
 __all__ = ["ARITHMETIC", "cache_folder", "inlined", "intrinsic", "kernel", "part"]
 
@@ -55,17 +57,55 @@ def kernel(function: F) -> F:
 
 def part(function: F) -> F:
     """Compile ``function`` where kernels call it; called from Python it stays plain text."""
-    return _part(**ARITHMETIC)(function)
+    register: Any = extending.register_jitable
+    return register(
+        nogil=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler, **ARITHMETIC
+    )(function)
 
 
 def inlined(function: F) -> F:
-    """Compile ``function`` into the kernels that call it; called from Python it stays plain text."""
-    return _part(**ARITHMETIC, forceinline=True)(function)
-
-
-def _part(**options: Any) -> Any:
+    """As :func:`part`, and the kernels that call it hold a copy."""
     register: Any = extending.register_jitable
-    return register(no_cfunc_wrapper=True, nogil=True, **options)
+    return register(
+        nogil=True,
+        no_cfunc_wrapper=True,
+        pipeline_class=_PartCompiler,
+        forceinline=True,
+        **ARITHMETIC,
+    )(function)
+
+
+class _NoEnvironment:
+    """Parts have no entry point of their own, so none of what Python would need there."""
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """Nothing to set."""
+
+
+class _PartLibrary(JITCodeLibrary):
+    """Code that is optimised and made to run only in the kernels it is linked into.
+
+    Numba does both for every function on its own first, and throws it away.
+    """
+
+    codegen = _NoEnvironment()  # type: ignore[assignment]
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """None: only kernels call it."""
+        self._ensure_finalized()
+        return 0
+
+
+class _PartCompiler(Compiler):
+    def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:
+        super().__init__(typing, target, _PartLibrary(target.codegen(), "part"), *rest)
 
 
 intrinsic: Any = extending.intrinsic
