@@ -6,11 +6,13 @@ import os
 import time
 from typing import Any
 
-from numba import types
+from numba import extending, types
 
-from granufab.kernels.options import compiled
+from granufab.kernels.options import ARITHMETIC
 
 __all__ = ["nanoseconds"]
+
+_overload: Any = extending.overload
 
 
 def nanoseconds(memory):
@@ -29,7 +31,7 @@ if os.name == "posix":
     _CLOCK = time.CLOCK_MONOTONIC
 
 
-@compiled(nanoseconds)
+@_overload(nanoseconds, jit_options=ARITHMETIC)
 def _nanoseconds(memory):
     if os.name != "posix":
         return lambda memory: 0

@@ -7,7 +7,7 @@ fills them in. Velocities follow from impulses chunk by chunk, whoever computes 
 from __future__ import annotations
 
 from granufab.kernels.impulses import apply_listed, local_velocity
-from granufab.kernels.options import kernel
+from granufab.kernels.options import part
 from granufab.kernels.pack import take_impulse
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.schedule import Plan, home_of
@@ -39,7 +39,7 @@ from granufab.kernels.vectors import (
 __all__ = ["count_contacts", "fill_contacts", "set_velocities", "store_impulses"]
 
 
-@kernel
+@part
 def count_contacts(pairs: Pairs, plan: Plan, piece):
     """Count a piece's active candidates, by chunk."""
     homes = plan.tally.shape[1]
@@ -52,7 +52,7 @@ def count_contacts(pairs: Pairs, plan: Plan, piece):
             plan.tally[piece, home] += 1
 
 
-@kernel
+@part
 def fill_contacts(
     pairs: Pairs, bodies: Bodies, box: Box, problem: Problem, state: State, plan: Plan,
     law: StepLaw, like, piece,
@@ -87,7 +87,7 @@ def fill_contacts(
         c += 1
 
 
-@kernel
+@part
 def _opening(gap, bounce, softness, law: StepLaw):
     """What a gap adds to b_n.
 
@@ -101,7 +101,7 @@ def _opening(gap, bounce, softness, law: StepLaw):
     return law.overlap_correction * gap / law.step
 
 
-@kernel
+@part
 def set_velocities(
     bodies: Bodies, box: Box, problem: Problem, state: State, plan: Plan, notes: Notes,
     counters, like, member, members,
@@ -135,7 +135,7 @@ def set_velocities(
     meet(counters, members)
 
 
-@kernel
+@part
 def store_impulses(pairs: Pairs, state: State, plan: Plan, slots: Slots, size, like, piece):
     """Impulses from the slots to the problem and the candidates; pairs outside carry none."""
     first, end = piece_of(len(pairs.length), piece)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from granufab.kernels.options import kernel
+from granufab.kernels.options import part
 from granufab.kernels.step_arrays import (
     FARTHEST,
     MATRIX,
@@ -29,7 +29,7 @@ __all__ = ["exponential", "half_drift"]
 ORDER = 8
 
 
-@kernel
+@part
 def half_drift(bodies: Bodies, box: Box, notes: Notes, counters, half, like, member, members):
     """Move grains and cell over ``half`` a step [s]; ends before the others may read the cell."""
     affine = notes.own[member, 0]
@@ -41,7 +41,7 @@ def half_drift(bodies: Bodies, box: Box, notes: Notes, counters, half, like, mem
         _move_cell(box, notes, affine, half)
 
 
-@kernel
+@part
 def exponential(matrix, factor, result, spare):
     """result ← exp(factor · matrix) for a small matrix, by the first nine terms of its series.
 
@@ -63,7 +63,7 @@ def exponential(matrix, factor, result, spare):
                 result[k, l] = spare[k, l]
 
 
-@kernel
+@part
 def _move_grains(bodies: Bodies, affine, half, piece, like):
     """r ← exp(h L/2) r + (h/2) c; returns the farthest squared wandering of the piece."""
     first, end = piece_of(len(bodies.position), piece)
@@ -77,7 +77,7 @@ def _move_grains(bodies: Bodies, affine, half, piece, like):
     return farthest
 
 
-@kernel
+@part
 def _move_cell(box: Box, notes: Notes, affine, half):
     matrix, rate, strain = box.tensors[MATRIX], box.tensors[RATE], box.tensors[STRAIN]
     moved = notes.own[0, 1]

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from granufab.kernels.options import kernel
+from granufab.kernels.options import part
 from granufab.kernels.step_arrays import (
     MATRIX,
     PIECES,
@@ -35,7 +35,7 @@ from granufab.kernels.vectors import (
 __all__ = ["find_missed", "measure_gaps", "survey", "turn_tangents"]
 
 
-@kernel
+@part
 def survey(bodies: Bodies, box: Box, pairs: Pairs, notes: Notes, law: StepLaw, like, piece):
     """Measure a piece of the pairs, keep its springs' memory, mark who takes part."""
     first, end = piece_of(len(pairs.length), piece)
@@ -54,7 +54,7 @@ def survey(bodies: Bodies, box: Box, pairs: Pairs, notes: Notes, law: StepLaw, l
     _select(bodies.motion, pairs, box.tensors[RATE], law, reach, like)
 
 
-@kernel
+@part
 def measure_gaps(
     position, radius, matrix, origin, pairs, images, normal, length, gap, reach, like
 ):  # fmt: skip
@@ -94,7 +94,7 @@ def measure_gaps(
         store(normal, c, scale(1.0 / distance, branch))
 
 
-@kernel
+@part
 def turn_tangents(impulse_t, normal, reach, like):
     """Turn 3D tangential impulses into the new tangent planes, keeping their lengths."""
     for c in range(reach[0], reach[1]):
@@ -111,7 +111,7 @@ def turn_tangents(impulse_t, normal, reach, like):
             store(impulse_t, c, scale(0.0, before))
 
 
-@kernel
+@part
 def _select(motion, pairs: Pairs, rate, law: StepLaw, reach, like):
     """Mark pairs that carried an impulse or could close within the step.
 
@@ -136,7 +136,7 @@ def _select(motion, pairs: Pairs, rate, law: StepLaw, reach, like):
         pairs.active[c] = gap < law.margin + law.step * (c_i + c_j) + stretch * abs(gap)
 
 
-@kernel
+@part
 def find_missed(pairs: Pairs, motion, rate, law: StepLaw, like, piece):
     """Switch on pairs left out of the solve that would overlap by its end; returns how many."""
     first, end = piece_of(len(pairs.length), piece)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from granufab.kernels.access import address
 from granufab.kernels.cell import add_outer
-from granufab.kernels.options import kernel
+from granufab.kernels.options import part
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.vectors import (
     add,
@@ -28,7 +28,7 @@ from granufab.kernels.vectors import (
 __all__ = ["apply_listed", "local_velocity"]
 
 
-@kernel
+@part
 def local_velocity(problem: Problem, motion, rate, c, like):
     """(u_n, u_t) of contact c without offsets: grains and free cell rates only [m/s]."""
     i, j = problem.first[c], problem.second[c]
@@ -42,7 +42,7 @@ def local_velocity(problem: Problem, motion, rate, c, like):
     return u_n, sub(tangential(u, n, u_n), turning)
 
 
-@kernel
+@part
 def apply_listed(problem: Problem, state: State, listed, reach, rate, like):
     """Add M⁻¹ H P of some contacts to the velocities of the bodies and to ``rate``.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from granufab.kernels.options import kernel
+from granufab.kernels.options import kernel, part
 
 __all__ = ["insert_randomly"]
 
@@ -59,7 +59,7 @@ def insert_randomly(radius, size, periodic, tries, seed):
     return position, count
 
 
-@kernel
+@part
 def _overlaps(trial, radius, i, position, size, periodic, bins, where, head, following):
     dimension = len(size)
     for code in range(3**dimension):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from granufab.kernels.impulses import local_velocity
-from granufab.kernels.options import kernel
+from granufab.kernels.options import kernel, part
 from granufab.kernels.problem import Problem
 from granufab.kernels.vectors import compose, load, load_tangent, norm2, store
 
@@ -19,7 +19,7 @@ def relative_velocity(problem: Problem, motion, rate, like, out_n, out_t):
         store(out_t, c, u_t)
 
 
-@kernel
+@part
 def virial(problem: Problem, impulse_n, impulse_t, reach, total, like):
     """Write Σ P⊗ℓ over contacts ``reach`` [N m s] into ``total``, row by row.
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from granufab.kernels.options import kernel
+from granufab.kernels.options import kernel, part
 
 __all__ = ["bin_counts", "find_pairs", "find_wall_pairs", "morton_order"]
 
 
-@kernel
+@part
 def bin_counts(inverse, reach, periodic):
     """Bins per axis so that a bin is at least ``reach`` wide; 1 where fewer than 3 would fit."""
     dimension = len(inverse)
@@ -28,7 +28,7 @@ def bin_counts(inverse, reach, periodic):
     return counts
 
 
-@kernel
+@part
 def _sort_into_bins(position, origin, inverse, periodic, counts):
     count, dimension = position.shape
     total = 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from granufab.kernels.motion import virial
-from granufab.kernels.options import kernel
+from granufab.kernels.options import part
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.release import determinant
 from granufab.kernels.step_arrays import (
@@ -44,7 +44,7 @@ __all__ = ["finish_step", "inspect", "report_step"]
 EXPONENT = 0x7FF0000000000000
 
 
-@kernel
+@part
 def _broken(bits):
     """How many numbers of a table, given as integers, are infinite or no numbers."""
     found = 0
@@ -55,7 +55,7 @@ def _broken(bits):
     return found
 
 
-@kernel
+@part
 def inspect(bodies: Bodies, problem: Problem, state: State, notes: Notes, like, piece):
     """A piece's share of the virial, and its numbers that are not finite."""
     part = notes.partial[piece]
@@ -65,7 +65,7 @@ def inspect(bodies: Bodies, problem: Problem, state: State, notes: Notes, like, 
     part[3] = _broken(bodies.bits[first:end])
 
 
-@kernel
+@part
 def finish_step(box: Box, notes: Notes, law: StepLaw):
     """Stress of the step and capped rates; whether a number is not finite."""
     tensors, partial, control = box.tensors, notes.partial, notes.control
@@ -93,7 +93,7 @@ def finish_step(box: Box, notes: Notes, law: StepLaw):
     return broken > 0.0
 
 
-@kernel
+@part
 def report_step(box: Box, notes: Notes, law: StepLaw, tolerance):
     """Write the row of a step; ends the call where an error or the goal is reached."""
     tensors, control = box.tensors, notes.control

@@ -5,7 +5,7 @@ from __future__ import annotations
 from granufab.kernels.access import address
 from granufab.kernels.cell import cell_weight
 from granufab.kernels.lanes import WIDTH
-from granufab.kernels.options import kernel
+from granufab.kernels.options import kernel, part
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.schedule import Plan
 from granufab.kernels.slots import Slots, fields, places
@@ -14,7 +14,7 @@ from granufab.kernels.vectors import inverse_mass, load, load_tangent
 __all__ = ["pack", "pack_chunk", "take_impulse", "unpack"]
 
 
-@kernel
+@part
 def pack_chunk(problem: Problem, state: State, plan: Plan, slots: Slots, home, part, like):
     """Fill the slots of a chunk, or a part of them, with contacts and warm start.
 
@@ -68,7 +68,7 @@ def pack_chunk(problem: Problem, state: State, plan: Plan, slots: Slots, home, p
         _fill_empty(plan, slots, home, size, at, len(state.motion) - 1)
 
 
-@kernel
+@part
 def _fill_empty(plan: Plan, slots: Slots, home, size, at, spare):
     """Places that no contact took: an open contact of the spare body."""
     values = slots.values
@@ -86,7 +86,7 @@ def _fill_empty(plan: Plan, slots: Slots, home, size, at, spare):
             values[base + WIDTH * at.inverse_t] = 1.0
 
 
-@kernel
+@part
 def take_impulse(slots: Slots, plan: Plan, size, c, state: State, like):
     """Write the impulse of contact ``c`` from its slot into the state."""
     at = places(like)

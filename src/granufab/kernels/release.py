@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from granufab.kernels.options import kernel
+from granufab.kernels.options import part
 from granufab.kernels.step_arrays import (
     EXTERNAL,
     FREE,
@@ -20,7 +20,7 @@ from granufab.kernels.step_arrays import (
 __all__ = ["determinant", "free_rates", "release"]
 
 
-@kernel
+@part
 def release(bodies: Bodies, box: Box, law: StepLaw, like, piece):
     """Free velocities of a piece of the bodies: gravity, then damping.
 
@@ -48,7 +48,7 @@ def release(bodies: Bodies, box: Box, law: StepLaw, like, piece):
                 start[i, k] = free[i, k] - fallen
 
 
-@kernel
+@part
 def determinant(matrix):
     """Of a 2×2 or 3×3 matrix."""
     if len(matrix) == 2:
@@ -60,7 +60,7 @@ def determinant(matrix):
     return total
 
 
-@kernel
+@part
 def free_rates(box: Box, law: StepLaw):
     """Free rates of the cell before the contacts act: damped, and pushed by the wanted stress."""
     tensors = box.tensors

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from granufab.kernels.lanes import WIDTH
-from granufab.kernels.options import kernel
+from granufab.kernels.options import kernel, part
 from granufab.kernels.step_arrays import PIECES
 
 __all__ = ["Plan", "arrange_chunk", "home_of", "list_homes", "place_chunks", "schedule"]
@@ -62,7 +62,7 @@ class Plan(NamedTuple):
         )
 
 
-@kernel
+@part
 def home_of(chunk, i, j):
     """Chunk of a contact of body i and body j (a wall: any from N on), or −1 between chunks."""
     if j >= len(chunk) or chunk[i] == chunk[j]:
@@ -70,7 +70,7 @@ def home_of(chunk, i, j):
     return -1
 
 
-@kernel
+@part
 def list_homes(plan: Plan):
     """From the tallies: where each piece lists its contacts, and how many there are."""
     homes = plan.tally.shape[1]
@@ -91,7 +91,7 @@ def list_homes(plan: Plan):
     return count
 
 
-@kernel
+@part
 def arrange_chunk(plan: Plan, first, second, home):
     """Put a chunk's contacts into batches that share no grain; walls and cells may be shared.
 
@@ -128,7 +128,7 @@ def arrange_chunk(plan: Plan, first, second, home):
     plan.starts[home + 1] = top
 
 
-@kernel
+@part
 def _mixed(at, head, end):
     """Visit each block in leaps: contacts in a row share grains and would have to queue."""
     start = head + (at - head) // BLOCK * BLOCK
@@ -136,7 +136,7 @@ def _mixed(at, head, end):
     return start + (at - start) * LEAP % size
 
 
-@kernel
+@part
 def place_chunks(plan: Plan):
     """One chunk's batches after the other's; returns how many there are."""
     plan.starts[0] = 0

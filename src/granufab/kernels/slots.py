@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granufab.kernels.options import compiled, kernel
+from granufab.kernels.options import part
+from granufab.kernels.tracing import traced
 
 __all__ = ["Slots", "fields", "places"]
 
@@ -55,6 +56,7 @@ class Places(NamedTuple):
     cross: int
 
 
+@traced
 def places(like):
     """Where the fields begin; ``like`` is a tuple of D zeros, numbers or lanes."""
     return (
@@ -64,14 +66,7 @@ def places(like):
     )
 
 
-@compiled(places)
-def _places(like):
-    if like.count == 2:
-        return lambda like: Places(0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12)
-    return lambda like: Places(0, 3, 4, 5, 8, 9, 10, 11, 12, 15, 16, 19)
-
-
-@kernel
+@part
 def fields(like, coupled):
     """Numbers that a contact takes."""
     cross = places(like).cross

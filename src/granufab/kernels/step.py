@@ -20,7 +20,7 @@ from granufab.kernels.contacts import (
 from granufab.kernels.drift import half_drift
 from granufab.kernels.geometry import find_missed, survey
 from granufab.kernels.lanes import WIDTH
-from granufab.kernels.options import kernel
+from granufab.kernels.options import kernel, part
 from granufab.kernels.outcome import finish_step, inspect, report_step
 from granufab.kernels.pack import pack_chunk
 from granufab.kernels.problem import Problem, State
@@ -120,7 +120,7 @@ def advance(step: Step, law: StepLaw, settings, like, wide, steps, member, membe
             break
 
 
-@kernel
+@part
 def _tick(notes: Notes, stage):
     """Count the time since the last call for a stage."""
     now = nanoseconds(notes.stamp)
@@ -128,7 +128,7 @@ def _tick(notes: Notes, stage):
     notes.clock[LATEST] = now
 
 
-@kernel
+@part
 def _drift(step: Step, law: StepLaw, like, member, members):
     """First half drift; asks for a search where grains may have come near unnoticed."""
     notes, counters = step.notes, step.work.counters
@@ -142,7 +142,7 @@ def _drift(step: Step, law: StepLaw, like, member, members):
     meet(counters, members)
 
 
-@kernel
+@part
 def _survey(step: Step, law: StepLaw, like, member, members):
     """Gaps, who takes part, free velocities."""
     notes = step.notes
@@ -159,7 +159,7 @@ def _survey(step: Step, law: StepLaw, like, member, members):
     meet(step.work.counters, members)
 
 
-@kernel
+@part
 def _solve(step: Step, law: StepLaw, settings, like, wide, member, members):
     """Solve, and again while a pair left out of the solve would overlap by its end."""
     notes, counters = step.notes, step.work.counters
@@ -176,7 +176,7 @@ def _solve(step: Step, law: StepLaw, settings, like, wide, member, members):
             return
 
 
-@kernel
+@part
 def _assemble(step: Step, law: StepLaw, like, member, members):
     """The contact problem in the slots of the sweep, velocities from the warm start."""
     pairs, problem, state, plan = step.pairs, step.problem, step.state, step.plan
@@ -212,7 +212,7 @@ def _assemble(step: Step, law: StepLaw, like, member, members):
     )
 
 
-@kernel
+@part
 def _iterate(step: Step, settings, like, wide, member, members):
     """Sweep; the free rates go to and fro through the memory of the solve."""
     problem, state, work, notes = step.problem, step.state, step.work, step.notes
@@ -238,7 +238,7 @@ def _iterate(step: Step, settings, like, wide, member, members):
         _tick(notes, ITERATION)
 
 
-@kernel
+@part
 def _store(step: Step, law: StepLaw, like, member, members):
     """Impulses to the candidates, velocities afresh; looks for pairs that were missed."""
     pairs, problem, state, plan = step.pairs, step.problem, step.state, step.plan
@@ -272,7 +272,7 @@ def _store(step: Step, law: StepLaw, like, member, members):
     meet(counters, members)
 
 
-@kernel
+@part
 def _finish(step: Step, law: StepLaw, settings, like, member, members):
     """Stress, second half drift, report."""
     notes, counters, box = step.notes, step.work.counters, step.box

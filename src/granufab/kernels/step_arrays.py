@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granufab.kernels.options import kernel
+from granufab.kernels.options import part
 
 __all__ = ["PIECES", "ROWS", "Bodies", "Box", "Notes", "Pairs", "StepLaw", "piece_of"]
 
@@ -158,7 +158,7 @@ class StepLaw(NamedTuple):
     strict: bool
 
 
-@kernel
+@part
 def piece_of(count, piece):
     """First item of a piece, and the end."""
     return count * piece // PIECES, count * (piece + 1) // PIECES
