@@ -9,7 +9,8 @@ import pytest
 from physics_cases import RIGID, grains
 
 from granufab.fabric import fourth_order_tensor, measure, select_contacts
-from granufab.kernels.motion import measure_gaps, relative_velocity
+from granufab.kernels.geometry import measure_gaps
+from granufab.kernels.motion import relative_velocity
 from granufab.kernels.neighbours import find_pairs
 from granufab.kernels.problem import Problem
 from granufab.packing import Cell, Packing
@@ -51,10 +52,11 @@ def _touching(position):
         np.full(dimension, -50.0),
         pairs,
         images,
-        count,
         normal,
         length,
         gap,
+        (0, found),
+        (0.0,) * dimension,
     )
     assert np.abs(gap).max() < 1e-14
     return Problem(

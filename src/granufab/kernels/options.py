@@ -18,7 +18,7 @@ from numba.core import config
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-__all__ = ["ARITHMETIC", "cache_folder", "inlined", "intrinsic", "kernel", "part"]
+__all__ = ["ARITHMETIC", "cache_folder", "inlined", "intrinsic", "kernel", "part", "steady"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 ARITHMETIC: dict[str, Any] = {"fastmath": {"contract", "nsz", "nnan"}, "error_model": "numpy"}
@@ -51,16 +51,16 @@ config.CACHE_DIR = cache_folder()  # type: ignore[attr-defined]
 
 def kernel(function: F) -> F:
     """Compile ``function`` with the package's options, cached on disk, releasing the GIL."""
-    compiled: Any = njit(cache=True, nogil=True, no_cfunc_wrapper=True, **ARITHMETIC)(function)
-    return compiled
+    compiled: Any = njit
+    return compiled(cache=True, nogil=True, no_cfunc_wrapper=True, **ARITHMETIC)(function)
 
 
 def part(function: F) -> F:
     """Compile ``function`` where kernels call it; called from Python it stays plain text."""
     register: Any = extending.register_jitable
-    return register(
-        nogil=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler, **ARITHMETIC
-    )(function)
+    return register(nogil=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler, **ARITHMETIC)(
+        function
+    )
 
 
 def inlined(function: F) -> F:
@@ -90,6 +90,9 @@ class _PartLibrary(JITCodeLibrary):
 
     codegen = _NoEnvironment()  # type: ignore[assignment]
 
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
     def _optimize_final_module(self) -> None:
         pass
 
@@ -110,3 +113,11 @@ class _PartCompiler(Compiler):
 
 intrinsic: Any = extending.intrinsic
 """A function of kernels written in LLVM's language."""
+
+
+def steady(function: F) -> F:
+    """As :func:`kernel`, for functions that allocate nothing: no references are counted."""
+    compiled: Any = njit(
+        cache=True, nogil=True, no_cfunc_wrapper=True, _nrt=False, **ARITHMETIC
+    )(function)
+    return compiled

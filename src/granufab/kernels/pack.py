@@ -9,9 +9,10 @@ from granufab.kernels.options import kernel, part
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.schedule import Plan
 from granufab.kernels.slots import Slots, fields, places
+from granufab.kernels.solve import solve
 from granufab.kernels.vectors import inverse_mass, load, load_tangent
 
-__all__ = ["pack", "pack_chunk", "take_impulse", "unpack"]
+__all__ = ["pack", "pack_chunk", "solve_packed", "take_impulse", "unpack"]
 
 
 @part
@@ -109,3 +110,9 @@ def unpack(slots: Slots, plan: Plan, size, state: State, like):
     """Write all impulses of the slots back, in the order of the problem."""
     for c in range(len(state.impulse_n)):
         take_impulse(slots, plan, size, c, state, like)
+
+
+@kernel
+def solve_packed(slots: Slots, bodies, law, work, like, size, settings, member, members):
+    """:func:`granufab.kernels.solve.solve`, for callers outside of kernels."""
+    return solve(slots, bodies, law, work, like, size, settings, member, members)

@@ -20,7 +20,7 @@ import numpy as np
 
 from granufab.kernels.access import address, item, set_item
 from granufab.kernels.cell import move_cell
-from granufab.kernels.options import inlined, kernel, part
+from granufab.kernels.options import inlined, part
 from granufab.kernels.slots import Slots
 from granufab.kernels.sweep import Law, defects, sweep
 from granufab.kernels.team import given_up, meet
@@ -57,7 +57,7 @@ class Work(NamedTuple):
     counters: np.ndarray
 
 
-@kernel
+@part
 def solve(slots: Slots, bodies, law: Law, work: Work, like, size, settings, member, members):
     """Sweep until the residual is met or the sweeps run out.
 

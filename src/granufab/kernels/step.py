@@ -20,7 +20,7 @@ from granufab.kernels.contacts import (
 from granufab.kernels.drift import half_drift
 from granufab.kernels.geometry import find_missed, survey
 from granufab.kernels.lanes import WIDTH
-from granufab.kernels.options import kernel, part
+from granufab.kernels.options import part, steady
 from granufab.kernels.outcome import finish_step, inspect, report_step
 from granufab.kernels.pack import pack_chunk
 from granufab.kernels.problem import Problem, State
@@ -88,7 +88,7 @@ class Step(NamedTuple):
     notes: Notes
 
 
-@kernel
+@steady
 def advance(step: Step, law: StepLaw, settings, like, wide, steps, member, members):
     """Make up to ``steps`` steps; ends early with a status, see ``step_arrays``.
 
@@ -98,7 +98,7 @@ def advance(step: Step, law: StepLaw, settings, like, wide, steps, member, membe
         settings: of the solve, see :func:`granufab.kernels.solve.solve`.
         like: tuple of D zeros.
         wide: width and dimension of the sweep (``access``).
-        steps: at most this many, and ROWS.
+        steps: at most this many, and ROWS; 0 only measures the candidate pairs.
         member, members: number of this thread, and how many work together.
     """
     control, counters = step.notes.control, step.work.counters
@@ -107,6 +107,9 @@ def advance(step: Step, law: StepLaw, settings, like, wide, steps, member, membe
         step.notes.clock[BEGAN] = nanoseconds(step.notes.stamp)
         step.notes.clock[LATEST] = step.notes.clock[BEGAN]
     meet(counters, members)
+    if steps == 0:
+        for piece in range(member, PIECES, members):
+            survey(step.bodies, step.box, step.pairs, step.notes, law, like, piece)
     while control[STATUS] == GOING and control[MADE] < steps:
         if control[PHASE] == DRIFT:
             _drift(step, law, like, member, members)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from granufab.kernels.geometry import measure_gaps, turn_tangents
 from granufab.kernels.neighbours import find_pairs, find_wall_pairs
 from granufab.kernels.step_arrays import Pairs
 from granufab.packing import Array, Contacts, IntArray, WallContacts
@@ -103,23 +102,6 @@ class Candidates:
         source, known = _match(old_keys, self.keys())
         self.impulse_n[known] = old_n[source]
         self.impulse_t[known] = old_t[source]
-
-    def measure(
-        self,
-        position: Array,
-        radius: Array,
-        matrix: Array,
-        origin: Array,
-        like: tuple[float, ...],
-    ) -> None:
-        """Normals, lengths and gaps at the present positions; impulses turn with the normals."""
-        everything = (0, self.count)
-        measure_gaps(
-            position, radius, matrix, origin, self.pairs, self.images,
-            self.normal, self.length, self.gap, everything, like,
-        )  # fmt: skip
-        if self.dimension == 3:
-            turn_tangents(self.impulse_t, self.normal, everything, like)
 
     def arrays(self) -> Pairs:
         """The candidates, for kernels; valid until the next search."""

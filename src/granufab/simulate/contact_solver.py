@@ -15,11 +15,11 @@ from numba.core import config
 
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.neighbours import morton_order
-from granufab.kernels.pack import pack, unpack
+from granufab.kernels.pack import pack, solve_packed, unpack
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.schedule import Plan, schedule
 from granufab.kernels.slots import Slots, fields
-from granufab.kernels.solve import CONTROLS, SUMS, Work, solve
+from granufab.kernels.solve import CONTROLS, SUMS, Work
 from granufab.kernels.sweep import Law
 from granufab.packing import Array, IntArray
 from granufab.simulate.bodies import aligned
@@ -149,7 +149,7 @@ class ContactSolver:
         work = self.work(state.motion)
         work.cells[-1, 0] = state.rate
         arguments = (packed.slots, state.motion, packed.law, work, self.width, packed.size, settings)
-        found = self.team.run(solve, arguments, self.threads)
+        found = self.team.run(solve_packed, arguments, self.threads)
         state.rate[:] = work.cells[-1, 0]
         return Solution(*found)
 

@@ -427,10 +427,8 @@ class Simulation:
         self._clock.seconds["search"] += time.perf_counter() - began
 
     def measure_gaps(self) -> None:
-        """Normals, lengths and gaps of the candidates at the present positions."""
-        self.candidates.measure(
-            self.position, self.radius, self.tensors[MATRIX], self.memory.origin, self.like
-        )
+        """Normals, lengths and gaps of the candidates; impulses turn with the normals."""
+        self._call(self._law(), 0)
 
     @property
     def volume(self) -> float:
