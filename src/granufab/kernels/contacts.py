@@ -6,11 +6,12 @@ fills them in. Velocities follow from impulses chunk by chunk, whoever computes 
 
 from __future__ import annotations
 
+from granufab.kernels.access import address
 from granufab.kernels.impulses import apply_listed, local_velocity
 from granufab.kernels.options import part
 from granufab.kernels.pack import take_impulse
 from granufab.kernels.problem import Problem, State
-from granufab.kernels.schedule import Plan, home_of
+from granufab.kernels.schedule import Plan
 from granufab.kernels.slots import Slots
 from granufab.kernels.step_arrays import (
     FREE_RATE,
@@ -22,6 +23,7 @@ from granufab.kernels.step_arrays import (
     Notes,
     Pairs,
     StepLaw,
+    copy_numbers,
     piece_of,
 )
 from granufab.kernels.team import meet
@@ -41,15 +43,16 @@ __all__ = ["count_contacts", "fill_contacts", "set_velocities", "store_impulses"
 
 @part
 def count_contacts(pairs: Pairs, plan: Plan, piece):
-    """Count a piece's active candidates, by chunk."""
+    """Count a piece's active candidates, by chunk; a piece of the grains has no batch yet."""
     homes = plan.tally.shape[1]
     for home in range(homes):
         plan.tally[piece, home] = 0
     first, end = piece_of(len(pairs.length), piece)
     for at in range(first, end):
-        if pairs.active[at]:
-            home = home_of(plan.chunk, pairs.pairs[at, 0], pairs.pairs[at, 1])
-            plan.tally[piece, home] += 1
+        plan.tally[piece, pairs.home[at]] += 1 if pairs.active[at] else 0
+    first, end = piece_of(len(plan.last), piece)
+    for i in range(first, end):
+        plan.last[i] = -1
 
 
 @part
@@ -81,7 +84,7 @@ def fill_contacts(
         problem.offset_n[c] = u_n + _opening(pairs.gap[at], bounce, problem.softness, law)
         memory = scale(problem.softness, load_tangent(pairs.memory_t, at, like))
         store(problem.offset_t, c, sub(tangential(u, n, u_n), memory))
-        home = home_of(plan.chunk, i, j)
+        home = pairs.home[at]
         plan.listed[plan.tally[piece, home]] = c
         plan.tally[piece, home] += 1
         c += 1
@@ -110,9 +113,8 @@ def set_velocities(
     free = box.tensors[FREE_RATE]
     for piece in range(member, PIECES, members):
         first, end = piece_of(len(bodies.motion), piece)
-        for i in range(first, end):
-            for k in range(bodies.motion.shape[1]):
-                bodies.motion[i, k] = bodies.free[i, k]
+        width = bodies.motion.shape[1]
+        copy_numbers(address(bodies.free), address(bodies.motion), first * width, end * width)
     meet(counters, members)
     between = len(plan.heads) - 2
     for home in range(member, between, members):

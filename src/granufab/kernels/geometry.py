@@ -9,7 +9,6 @@ import numpy as np
 from granufab.kernels.options import part
 from granufab.kernels.step_arrays import (
     MATRIX,
-    PIECES,
     RATE,
     Bodies,
     Box,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from granufab.kernels.access import address
+from granufab.kernels.access import address, put, put_tangent, set_item, take, take_tangent
 from granufab.kernels.cell import cell_weight
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.options import kernel, part
@@ -10,7 +10,8 @@ from granufab.kernels.problem import Problem, State
 from granufab.kernels.schedule import Plan
 from granufab.kernels.slots import Slots, fields, places
 from granufab.kernels.solve import solve
-from granufab.kernels.vectors import inverse_mass, load, load_tangent
+from granufab.kernels.tracing import traced
+from granufab.kernels.vectors import inverse_mass, load, load_tangent, store
 
 __all__ = ["pack", "pack_chunk", "solve_packed", "take_impulse", "unpack"]
 
@@ -27,46 +28,59 @@ def pack_chunk(problem: Problem, state: State, plan: Plan, slots: Slots, home, p
         part: (which, of how many): members may share the contacts.
         like: tuple of D zeros.
     """
-    values = slots.values
+    values = address(slots.values)
     size = fields(like, problem.coupled) * WIDTH
     at = places(like)
     offset = plan.starts[home] * WIDTH
     eps, kappa, weight = problem.softness, problem.spin_factor, address(problem.weight)
+    crossed = problem.coupled and len(like) == 2
     head, count = plan.heads[home], plan.heads[home + 1] - plan.heads[home]
-    for k in range(head + count * part[0] // part[1], head + count * (part[0] + 1) // part[1]):
-        c = plan.listed[k]
+    for place in range(head + count * part[0] // part[1], head + count * (part[0] + 1) // part[1]):
+        c = plan.listed[place]
         slot = plan.order[c] + offset
         plan.order[c] = slot
         base = slot // WIDTH * size + slot % WIDTH
         i, j = problem.first[c], problem.second[c]
         slots.first[slot], slots.second[slot] = i, j
         n, length = load(problem.normal, c, like), problem.length[c]
-        for k in range(len(like)):
-            values[base + WIDTH * (at.normal + k)] = n[k]
-        values[base + WIDTH * at.length] = length
-        values[base + WIDTH * at.offset_n] = problem.offset_n[c]
-        values[base + WIDTH * at.mu] = problem.mu[c]
-        values[base + WIDTH * at.impulse_n] = state.impulse_n[c]
-        values[base + WIDTH * at.before_n] = state.impulse_n[c]
-        offset_t, impulse_t = load_tangent(problem.offset_t, c, like), state.impulse_t
-        for k in range(len(offset_t)):
-            values[base + WIDTH * (at.offset_t + k)] = offset_t[k]
-            values[base + WIDTH * (at.impulse_t + k)] = impulse_t[c, k]
-            values[base + WIDTH * (at.before_t + k)] = impulse_t[c, k]
         mass = inverse_mass(state.motion, i, like) + inverse_mass(state.motion, j, like)
         w_n, w_t = mass + eps, mass + kappa * mass + eps
         if problem.coupled:
             extra_n, extra_nt, extra_t = cell_weight(weight, n, length)
             w_n, w_t = w_n + extra_n, w_t + extra_t
-            if len(like) == 2:
-                values[base + WIDTH * at.cross] = extra_nt
+            if crossed:
+                set_item(values, base + WIDTH * at.cross, extra_nt)
         else:
             w_n += length * length * problem.dilation_weight
-        crossed = problem.coupled and len(like) == 2
-        values[base + WIDTH * at.inverse_n] = w_n if crossed else 1.0 / w_n
-        values[base + WIDTH * at.inverse_t] = w_t if crossed else 1.0 / w_t
+        inverse = (w_n, w_t) if crossed else (1.0 / w_n, 1.0 / w_t)
+        offset_t = load_tangent(problem.offset_t, c, like)
+        p_n, p_t = state.impulse_n[c], load_tangent(state.impulse_t, c, like)
+        numbers = (length, problem.offset_n[c], problem.mu[c])
+        _write(values, base, n, numbers, offset_t, inverse, p_n, p_t, like)
     if part[0] == 0:
         _fill_empty(plan, slots, home, size, at, len(state.motion) - 1)
+
+
+@traced
+def _write(values, base, n, numbers, offset_t, inverse, p_n, p_t, like):
+    """The fields of one contact; ``numbers``: length, b_n, µ; the iterate before is this one."""
+    at = places(like)
+    put_tangent(values, base, at.normal, n)
+    for field, value in zip((at.length, at.offset_n, at.mu), numbers, strict=True):
+        put(values, base, field, value)
+    put_tangent(values, base, at.offset_t, offset_t)
+    put(values, base, at.inverse_n, inverse[0])
+    put(values, base, at.inverse_t, inverse[1])
+    for place_n, place_t in ((at.impulse_n, at.impulse_t), (at.before_n, at.before_t)):
+        put(values, base, place_n, p_n)
+        put_tangent(values, base, place_t, p_t)
+
+
+@traced
+def _read(values, base, like):
+    """The impulse of one contact."""
+    at = places(like)
+    return take(values, base, at.impulse_n, like), take_tangent(values, base, at.impulse_t, like)
 
 
 @part
@@ -90,12 +104,10 @@ def _fill_empty(plan: Plan, slots: Slots, home, size, at, spare):
 @part
 def take_impulse(slots: Slots, plan: Plan, size, c, state: State, like):
     """Write the impulse of contact ``c`` from its slot into the state."""
-    at = places(like)
     slot = plan.order[c]
-    base = slot // WIDTH * size + slot % WIDTH
-    state.impulse_n[c] = slots.values[base + WIDTH * at.impulse_n]
-    for k in range(state.impulse_t.shape[1]):
-        state.impulse_t[c, k] = slots.values[base + WIDTH * (at.impulse_t + k)]
+    p_n, p_t = _read(address(slots.values), slot // WIDTH * size + slot % WIDTH, like)
+    state.impulse_n[c] = p_n
+    store(state.impulse_t, c, p_t)
 
 
 @kernel

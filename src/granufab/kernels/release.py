@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from granufab.kernels.access import address
 from granufab.kernels.options import part
 from granufab.kernels.step_arrays import (
     EXTERNAL,
@@ -14,6 +15,7 @@ from granufab.kernels.step_arrays import (
     Bodies,
     Box,
     StepLaw,
+    copy_numbers,
     piece_of,
 )
 
@@ -32,11 +34,9 @@ def release(bodies: Bodies, box: Box, law: StepLaw, like, piece):
     dimension = len(like)
     moving = dimension + (1 if dimension == 2 else 3)
     kept = 1.0 - law.damping
-    for i in range(first, end):
-        for k in range(motion.shape[1]):
-            free[i, k] = motion[i, k]
-        if i >= grain_count:
-            continue
+    width = motion.shape[1]
+    copy_numbers(address(motion), address(free), first * width, end * width)
+    for i in range(first, min(end, grain_count)):
         for k in range(dimension):
             free[i, k] += law.step * box.gravity[k]
         for k in range(moving):

@@ -97,17 +97,16 @@ def arrange_chunk(plan: Plan, first, second, home):
 
     Blocks of contacts keep their order, so a sweep moves through memory: each contact goes into
     the first batch with room after the last ones of its grains. The number of batches is left in
-    ``starts[home + 1]`` until :func:`place_chunks`.
+    ``starts[home + 1]`` until :func:`place_chunks`. ``last`` holds −1 for all grains before.
     """
     grain_count, head, end = len(plan.last), plan.heads[home], plan.heads[home + 1]
     taken = plan.taken[head + home :]
     for k in range(end - head + 1):
         taken[k] = 0
-    for at in range(head, end):
-        i, j = first[plan.listed[at]], second[plan.listed[at]]
-        plan.last[i] = -1
-        if j < grain_count:
-            plan.last[j] = -1
+    if home == len(plan.heads) - 2:  # between chunks: these grains had batches in their own
+        for at in range(head, end):
+            plan.last[first[plan.listed[at]]] = -1
+            plan.last[second[plan.listed[at]]] = -1
     low, top = 0, 0
     for at in range(head, end):
         c = plan.listed[_mixed(at, head, end)]
@@ -159,6 +158,8 @@ def schedule(plan: Plan, first, second):
     for piece in range(PIECES):
         for home in range(between + 1):
             plan.tally[piece, home] = 0
+    for i in range(len(plan.last)):
+        plan.last[i] = -1
     for c in range(len(first)):
         plan.tally[0, home_of(plan.chunk, first[c], second[c])] += 1
     list_homes(plan)

@@ -9,9 +9,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from granufab.kernels.access import item, set_item
 from granufab.kernels.options import part
 
-__all__ = ["PIECES", "ROWS", "Bodies", "Box", "Notes", "Pairs", "StepLaw", "piece_of"]
+__all__ = [
+    "PIECES",
+    "ROWS",
+    "Bodies",
+    "Box",
+    "Notes",
+    "Pairs",
+    "StepLaw",
+    "copy_numbers",
+    "piece_of",
+]
 
 PIECES = 16
 """Parts into which bodies and pairs are split: sums do not depend on the number of threads."""
@@ -88,6 +99,7 @@ class Pairs(NamedTuple):
         active: whether they take part in the solve.
         impulse_n, impulse_t: [N s]; memory_t: impulse_t at the start of the step.
         friction: µ [-].
+        home: chunk of both bodies, the last one for pairs between chunks.
     """
 
     pairs: np.ndarray
@@ -100,6 +112,7 @@ class Pairs(NamedTuple):
     impulse_t: np.ndarray
     memory_t: np.ndarray
     friction: np.ndarray
+    home: np.ndarray
 
 
 class Notes(NamedTuple):
@@ -162,3 +175,10 @@ class StepLaw(NamedTuple):
 def piece_of(count, piece):
     """First item of a piece, and the end."""
     return count * piece // PIECES, count * (piece + 1) // PIECES
+
+
+@part
+def copy_numbers(source, target, first, end):
+    """Copy numbers ``first`` … ``end`` − 1 from one address to another."""
+    for k in range(first, end):
+        set_item(target, k, item(source, k))

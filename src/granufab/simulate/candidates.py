@@ -38,6 +38,7 @@ class Candidates:
         self.impulse_t = np.zeros((count, self.tangents))
         self.memory_t = np.zeros((count, self.tangents))
         self.friction = np.zeros(count)
+        self.home = np.zeros(count, np.int64)
 
     @property
     def count(self) -> int:
@@ -103,11 +104,17 @@ class Candidates:
         self.impulse_n[known] = old_n[source]
         self.impulse_t[known] = old_t[source]
 
+    def divide(self, chunk: IntArray, chunk_count: int) -> None:
+        """Note in which chunk of grains each pair lies; ``chunk_count`` for those between."""
+        first, second = self.pairs[:, 0], self.pairs[:, 1]
+        inner = chunk[first] == chunk[np.where(second < self.grain_count, second, first)]
+        self.home[:] = np.where(inner, chunk[first], chunk_count)
+
     def arrays(self) -> Pairs:
         """The candidates, for kernels; valid until the next search."""
         return Pairs(
             self.pairs, self.images, self.normal, self.length, self.gap, self.active,
-            self.impulse_n, self.impulse_t, self.memory_t, self.friction,
+            self.impulse_n, self.impulse_t, self.memory_t, self.friction, self.home,
         )  # fmt: skip
 
     def impulses(self) -> Array:

@@ -148,7 +148,15 @@ class ContactSolver:
         """Sweep; impulses stay in the packed contacts, velocities and rates in ``state``."""
         work = self.work(state.motion)
         work.cells[-1, 0] = state.rate
-        arguments = (packed.slots, state.motion, packed.law, work, self.width, packed.size, settings)
+        arguments = (
+            packed.slots,
+            state.motion,
+            packed.law,
+            work,
+            self.width,
+            packed.size,
+            settings,
+        )
         found = self.team.run(solve_packed, arguments, self.threads)
         state.rate[:] = work.cells[-1, 0]
         return Solution(*found)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import time
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -171,9 +171,7 @@ class Simulation:
     @gravity.setter
     def gravity(self, value: Array) -> None:
         if value.shape != (self.dimension,):
-            raise InvalidSettings(
-                f"gravity has shape {value.shape}, expected {(self.dimension,)}"
-            )
+            raise InvalidSettings(f"gravity has shape {value.shape}, expected {(self.dimension,)}")
         self.memory.gravity[:] = value
 
     @property
@@ -416,10 +414,12 @@ class Simulation:
         self.candidates.search(
             self.position, self.radius, (matrix, origin, self.periodic), self._skin, friction
         )
-        self.contact_solver.arrange(self.position, matrix, origin)
+        solver = self.contact_solver
+        solver.arrange(self.position, matrix, origin)
+        self.candidates.divide(solver.chunk, solver.chunk_count)
         count = self.candidates.count
         self.memory.reserve(count)
-        self.contact_solver.slots(count // WIDTH + FEWEST_BATCHES, coupled=self.coupled)
+        solver.slots(count // WIDTH + FEWEST_BATCHES, coupled=self.coupled)
         self.memory.walked[:] = 0.0
         control = self.memory.notes.control
         control[STRAIN_WALKED], control[FARTHEST] = 0.0, 0.0
