@@ -33,17 +33,9 @@ def _touching(position):
     count, dimension = position.shape
     matrix = np.eye(dimension) * 100.0
     radius = np.full(count, 0.5)
-    pairs, images, found = find_pairs(
-        position,
-        radius,
-        matrix,
-        np.linalg.inv(matrix),
-        np.full(dimension, -50.0),
-        np.ones(dimension, dtype=bool),
-        1e-9,
-        20 * count,
-    )
-    pairs, images = pairs[:found], images[:found]
+    cell = (matrix, np.full(dimension, -50.0), np.ones(dimension, dtype=bool))
+    pairs, images = find_pairs(position, radius, cell, 1e-9)
+    found = len(pairs)
     normal, length, gap = np.empty((found, dimension)), np.empty(found), np.empty(found)
     measure_gaps(
         position,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from granufab.kernels.neighbours import find_pairs, find_wall_pairs
@@ -63,6 +66,7 @@ class Candidates:
         cell: tuple[Array, Array, np.ndarray],
         skin: float,
         friction: tuple[float, float],
+        run: Callable[..., Any] | None = None,
     ) -> None:
         """Find all pairs within ``skin`` [m], keep known impulses.
 
@@ -72,18 +76,13 @@ class Candidates:
             cell: (matrix, origin, periodic).
             skin: surface distance [m].
             friction: (µ between grains, µ on walls).
+            run: team that searches, see :func:`granufab.kernels.neighbours.find_pairs`.
         """
         matrix, origin, periodic = cell
-        inverse = np.linalg.inv(matrix)
-        capacity = max(64, (self.dimension * 4) * len(radius), 2 * self.count)
-        while True:
-            pairs, images, found = find_pairs(
-                position, radius, matrix, inverse, origin, periodic, skin, capacity
-            )
-            if found <= capacity:
-                break
-            capacity = found
-        pairs, images = pairs[:found], images[:found]
+        pairs, images = find_pairs(
+            position, radius, cell, skin, room=max(2 * self.dimension * len(radius), self.count),
+            run=run,
+        )  # fmt: skip
         if not periodic.all():
             room = 2 * self.dimension * len(radius)
             walls, touching = find_wall_pairs(

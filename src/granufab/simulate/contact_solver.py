@@ -7,6 +7,7 @@ the result has the same bits for any number of threads.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -160,6 +161,10 @@ class ContactSolver:
         found = self.team.run(solve_packed, arguments, self.threads)
         state.rate[:] = work.cells[-1, 0]
         return Solution(*found)
+
+    def together(self, kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        """Call a kernel for every thread of the solver; see :meth:`Team.run`."""
+        return self.team.run(kernel, arguments, self.threads)
 
     def plan(self, contact_count: int) -> Plan:
         """Memory to arrange at least so many contacts, for the present chunks."""

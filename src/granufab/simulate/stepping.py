@@ -342,7 +342,7 @@ class Simulation:
         )
         arguments = (step, law, self._solve_settings(), self.like, solver.width, steps)
         try:
-            solver.team.run(advance, arguments, solver.threads)
+            solver.together(advance, arguments)
         except BaseException:
             memory.notes.control[PHASE] = DRIFT
             raise
@@ -411,10 +411,11 @@ class Simulation:
         matrix, origin = self.tensors[MATRIX], self.memory.origin
         shorten_cell(matrix, self.periodic, self.remap, self.candidates.shear_images)
         friction = (self.material.friction, self.material.wall_friction)
-        self.candidates.search(
-            self.position, self.radius, (matrix, origin, self.periodic), self._skin, friction
-        )
         solver = self.contact_solver
+        self.candidates.search(
+            self.position, self.radius, (matrix, origin, self.periodic), self._skin, friction,
+            solver.together,
+        )  # fmt: skip
         solver.arrange(self.position, matrix, origin)
         self.candidates.divide(solver.chunk, solver.chunk_count)
         count = self.candidates.count

@@ -69,11 +69,14 @@ class Team:
         return {**self.__dict__, "_pool": None, "counters": np.zeros(COUNTERS, np.int64)}
 
     def ready(self) -> IntArray:
-        """The counters of the next run: new ones in a fork, which has none of its parent's threads."""
+        """The counters of the next run; a fork gets its own, and threads of its own."""
+        self._forget_fork()
+        return self.counters
+
+    def _forget_fork(self) -> None:
         if self._process != os.getpid():
             self._process, self._pool = os.getpid(), None
             self.counters = np.zeros(COUNTERS, np.int64)
-        return self.counters
 
     def run(self, kernel: Callable[..., Any], arguments: tuple[Any, ...], members: int) -> Any:
         """Call ``kernel(*arguments, member, members)`` for every member; the first one's result.
@@ -101,6 +104,7 @@ class Team:
         return found
 
     def _submit(self, kernel: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        self._forget_fork()
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self.most - 1, thread_name_prefix="granufab")
         return self._pool.submit(kernel, *arguments)
