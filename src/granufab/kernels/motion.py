@@ -9,8 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from granufab.kernels.impulses import local_velocity
+from granufab.kernels.memory import empty, zeros
 from granufab.kernels.options import kernel
 from granufab.kernels.problem import Problem
+from granufab.kernels.tracing import larger, root
 from granufab.kernels.vectors import (
     compose,
     dot,
@@ -41,7 +43,7 @@ __all__ = [
 def drift(position, motion, affine, half_step):
     """r ← exp(h L/2) r + (h/2) c for every grain; ``affine`` is exp(h L/2)."""
     dimension = position.shape[1]
-    moved = np.empty(dimension)
+    moved = empty((dimension,), np.float64)
     for i in range(len(position)):
         for k in range(dimension):
             x = half_step * motion[i, k]
@@ -62,8 +64,8 @@ def accumulate_drift(walked, motion, step):
         for k in range(dimension):
             walked[i, k] += step * motion[i, k]
             square += walked[i, k] ** 2
-        largest = max(largest, square)
-    return np.sqrt(largest)
+        largest = larger(largest, square)
+    return root(largest)
 
 
 @kernel
@@ -95,7 +97,7 @@ def measure_gaps(position, radius, matrix, origin, pairs, images, grain_count, n
                 x += matrix[k, l] * images[c, l]
             normal[c, k] = x
             square += x * x
-        distance = np.sqrt(square)
+        distance = root(square)
         length[c] = distance
         gap[c] = distance - radius[i] - radius[j]
         for k in range(dimension):
@@ -164,7 +166,7 @@ def find_missed(pairs, normal, length, gap, active, motion, total_rate, step, to
 def virial(problem: Problem, impulse_n, impulse_t, like):
     """Σ P⊗ℓ over contacts [N m s], shape (D, D); divided by h V it is the stress."""
     dimension = len(like)
-    total = np.zeros((dimension, dimension))
+    total = zeros((dimension, dimension), np.float64)
     for c in range(len(problem.length)):
         n = load(problem.normal, c, like)
         push = compose(n, impulse_n[c], load_tangent(impulse_t, c, like))
@@ -202,6 +204,6 @@ def turn_tangents(impulse_t, normal, like):
         turned = tangential(before, n, dot(n, before))
         kept = norm2(turned)
         if kept > 0.0:
-            store(impulse_t, c, scale(np.sqrt(size / kept), turned))
+            store(impulse_t, c, scale(root(size / kept), turned))
         else:
             store(impulse_t, c, scale(0.0, before))

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from granufab.kernels.memory import empty, zeros
 from granufab.kernels.options import kernel, part
+from granufab.kernels.tracing import floor, larger, root, smaller, whole
 
 __all__ = ["bin_counts", "find_pairs", "find_wall_pairs", "morton_order"]
 
@@ -18,12 +20,12 @@ __all__ = ["bin_counts", "find_pairs", "find_wall_pairs", "morton_order"]
 def bin_counts(inverse, reach, periodic):
     """Bins per axis so that a bin is at least ``reach`` wide; 1 where fewer than 3 would fit."""
     dimension = len(inverse)
-    counts = np.ones(dimension, np.int64)
+    counts = empty((dimension,), np.int64)
     for k in range(dimension):
         square = 0.0
         for l in range(dimension):
             square += inverse[k, l] ** 2
-        number = int(1.0 / (np.sqrt(square) * reach))
+        number = whole(1.0 / (root(square) * reach))
         counts[k] = number if number >= (3 if periodic[k] else 1) else 1
     return counts
 
@@ -34,10 +36,10 @@ def _sort_into_bins(position, origin, inverse, periodic, counts):
     total = 1
     for k in range(dimension):
         total *= counts[k]
-    where = np.empty((count, dimension), np.int64)
-    shift = np.zeros((count, dimension), np.int64)
-    start = np.zeros(total + 1, np.int64)
-    flat = np.empty(count, np.int64)
+    where = empty((count, dimension), np.int64)
+    shift = zeros((count, dimension), np.int64)
+    start = zeros((total + 1,), np.int64)
+    flat = empty((count,), np.int64)
     for i in range(count):
         index = 0
         for k in range(dimension):
@@ -45,18 +47,20 @@ def _sort_into_bins(position, origin, inverse, periodic, counts):
             for l in range(dimension):
                 s += inverse[k, l] * (position[i, l] - origin[l])
             if periodic[k]:
-                whole = np.floor(s)
-                shift[i, k] = int(whole)
-                s -= whole
-            place = min(max(int(s * counts[k]), 0), counts[k] - 1)
+                turns = floor(s)
+                shift[i, k] = whole(turns)
+                s -= turns
+            place = smaller(larger(whole(s * counts[k]), 0), counts[k] - 1)
             where[i, k] = place
             index = index * counts[k] + place
         flat[i] = index
         start[index + 1] += 1
     for b in range(total):
         start[b + 1] += start[b]
-    items = np.empty(count, np.int64)
-    fill = start.copy()
+    items = empty((count,), np.int64)
+    fill = empty((total,), np.int64)
+    for b in range(total):
+        fill[b] = start[b]
     for i in range(count):
         items[fill[flat[i]]] = i
         fill[flat[i]] += 1
@@ -74,13 +78,13 @@ def find_pairs(position, radius, matrix, inverse, origin, periodic, skin, capaci
     count, dimension = position.shape
     largest = 0.0
     for i in range(count):
-        largest = max(largest, radius[i])
+        largest = larger(largest, radius[i])
     counts = bin_counts(inverse, 2.0 * largest + skin, periodic)
     where, shift, start, items = _sort_into_bins(position, origin, inverse, periodic, counts)
-    pairs = np.empty((capacity, 2), np.int32)
-    images = np.empty((capacity, dimension), np.int32)
+    pairs = empty((capacity, 2), np.int32)
+    images = empty((capacity, dimension), np.int32)
     found = 0
-    image = np.zeros(dimension, np.int64)
+    image = empty((dimension,), np.int64)
     neighbours = 3**dimension
     for i in range(count):
         for code in range(neighbours):
@@ -126,7 +130,7 @@ def find_pairs(position, radius, matrix, inverse, origin, periodic, skin, capaci
 def find_wall_pairs(position, radius, matrix, origin, periodic, skin, capacity):
     """Pairs of a grain and a flat wall 2·axis + side within ``skin``; as (pairs, count)."""
     count, dimension = position.shape
-    pairs = np.empty((capacity, 2), np.int32)
+    pairs = empty((capacity, 2), np.int32)
     found = 0
     for i in range(count):
         for k in range(dimension):
@@ -153,13 +157,13 @@ def _morton_keys(position, origin, inverse):
     """Place of every grain along the curve."""
     count, dimension = position.shape
     bits = 20 if dimension == 3 else 30
-    keys = np.zeros(count, np.int64)
+    keys = zeros((count,), np.int64)
     for i in range(count):
         for k in range(dimension):
             s = 0.0
             for l in range(dimension):
                 s += inverse[k, l] * (position[i, l] - origin[l])
-            place = int((s - np.floor(s)) * 2.0**bits)
+            place = whole((s - floor(s)) * 2.0**bits)
             for bit in range(bits):
                 keys[i] |= ((place >> bit) & 1) << (bit * dimension + k)
     return keys

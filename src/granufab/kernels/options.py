@@ -58,9 +58,9 @@ def kernel(function: F) -> F:
 def part(function: F) -> F:
     """Compile ``function`` where kernels call it; called from Python it stays plain text."""
     register: Any = extending.register_jitable
-    return register(
-        nogil=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler, **ARITHMETIC
-    )(function)
+    return register(nogil=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler, **ARITHMETIC)(
+        function
+    )
 
 
 def inlined(function: F) -> F:
@@ -89,6 +89,9 @@ class _PartLibrary(JITCodeLibrary):
     """
 
     codegen = _NoEnvironment()  # type: ignore[assignment]
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
         pass

@@ -15,9 +15,10 @@ import numpy as np
 from granufab.kernels.access import address
 from granufab.kernels.cell import cell_weight
 from granufab.kernels.lanes import WIDTH
+from granufab.kernels.memory import empty, unlinked, zeros
 from granufab.kernels.options import kernel, part
 from granufab.kernels.problem import Problem
-from granufab.kernels.tracing import traced
+from granufab.kernels.tracing import larger, smaller, traced
 from granufab.kernels.vectors import inverse_mass, load
 
 __all__ = ["Slots", "fields", "pack", "places", "schedule", "unpack"]
@@ -97,29 +98,31 @@ def schedule(first, second, grain_count, chunk, chunk_count, order):
         First batch of every chunk, of the contacts between chunks, and the end.
     """
     count = len(first)
-    starts = np.zeros(chunk_count + 2, np.int64)
-    heads = np.zeros(chunk_count + 2, np.int64)
+    starts = zeros((chunk_count + 2,), np.int64)
+    heads = zeros((chunk_count + 2,), np.int64)
     for c in range(count):
         heads[_home(chunk, first[c], second[c], grain_count, chunk_count) + 1] += 1
     for k in range(chunk_count + 1):
         heads[k + 1] += heads[k]
-    listed = np.empty(count, np.int64)
-    fill = heads.copy()
+    listed = empty((count,), np.int64)
+    fill = empty((chunk_count + 2,), np.int64)
+    for k in range(len(heads)):
+        fill[k] = heads[k]
     for c in range(count):
         home = _home(chunk, first[c], second[c], grain_count, chunk_count)
         listed[fill[home]] = c
         fill[home] += 1
-    last = np.full(grain_count, -1, np.int64)
-    taken = np.zeros(count + 1, np.int64)
+    last = unlinked((grain_count,), np.int64)
+    taken = zeros((count + 1,), np.int64)
     low, top = 0, 0
     for k in range(chunk_count + 1):
         starts[k], low = top, top
         for at in range(heads[k], heads[k + 1]):
             c = listed[_mixed(at, heads[k], heads[k + 1])]
             i, j = first[c], second[c]
-            batch = max(low, last[i] + 1)
+            batch = larger(low, last[i] + 1)
             if j < grain_count:
-                batch = max(batch, last[j] + 1)
+                batch = larger(batch, last[j] + 1)
             while taken[batch] == WIDTH:
                 batch += 1
             order[c] = batch * WIDTH + taken[batch]
@@ -127,7 +130,7 @@ def schedule(first, second, grain_count, chunk, chunk_count, order):
             last[i] = batch
             if j < grain_count:
                 last[j] = batch
-            top = max(top, batch + 1)
+            top = larger(top, batch + 1)
             while taken[low] == WIDTH:
                 low += 1
     starts[chunk_count + 1] = top
@@ -138,7 +141,7 @@ def schedule(first, second, grain_count, chunk, chunk_count, order):
 def _mixed(at, head, end):
     """Visit each block in leaps: contacts in a row share grains and would have to queue."""
     start = head + (at - head) // BLOCK * BLOCK
-    size = min(BLOCK, end - start)
+    size = smaller(BLOCK, end - start)
     return start + (at - start) * LEAP % size
 
 

@@ -16,7 +16,17 @@ from granufab.kernels import lanes
 from granufab.kernels.lanes import DOUBLE, LANES, SIZE, WIDTH
 from granufab.kernels.options import ARITHMETIC
 
-__all__ = ["Address", "Real", "Table", "Truth", "Whole", "as_double", "is_lanes", "number"]
+__all__ = [
+    "Address",
+    "Real",
+    "Table",
+    "Truth",
+    "Whole",
+    "as_double",
+    "as_integer",
+    "is_lanes",
+    "number",
+]
 
 _FLAGS = tuple(sorted(ARITHMETIC["fastmath"]))
 
@@ -132,14 +142,24 @@ class Whole:
     def __add__(self, other: Any) -> Whole:
         if isinstance(other, Real):
             return NotImplemented
-        return Whole(self.builder, self.builder.add(self.value, _integer(other)))
+        return Whole(self.builder, self.builder.add(self.value, as_integer(other)))
 
     def __mul__(self, other: Any) -> Whole:
         if isinstance(other, Real):
             return NotImplemented
-        return Whole(self.builder, self.builder.mul(self.value, _integer(other)))
+        return Whole(self.builder, self.builder.mul(self.value, as_integer(other)))
 
     __radd__, __rmul__ = __add__, __mul__
+
+    def _compare(self, sign: str, other: Any) -> Truth:
+        answer = self.builder.icmp_signed(sign, self.value, as_integer(other))
+        return Truth(self.builder, answer)
+
+    def __lt__(self, other: Any) -> Truth:
+        return self._compare("<", other)
+
+    def __gt__(self, other: Any) -> Truth:
+        return self._compare(">", other)
 
 
 class Address:
@@ -157,25 +177,25 @@ class Address:
         self.builder.store(as_double(self.builder, value), self._item(place))
 
     def _item(self, place: Any) -> Any:
-        return lanes.item_of(self.builder, self.value, _integer(place))
+        return lanes.item_of(self.builder, self.value, as_integer(place))
 
     def lanes(self, place: Any) -> Real:
         """Eight neighbouring numbers."""
-        return Real(self.builder, lanes.load_lanes(self.builder, self.value, _integer(place)))
+        return Real(self.builder, lanes.load_lanes(self.builder, self.value, as_integer(place)))
 
     def put_lanes(self, place: Any, value: Real) -> None:
         """Write eight neighbouring numbers."""
-        lanes.store_lanes(self.builder, self.value, _integer(place), value.value)
+        lanes.store_lanes(self.builder, self.value, as_integer(place), value.value)
 
     def gather(self, index: Address, place: Any, width: int) -> tuple[Real, ...]:
         """Columns of eight rows of this table, see :func:`lanes.gather`."""
-        columns = lanes.gather(self.builder, self.value, index.value, _integer(place), width)
+        columns = lanes.gather(self.builder, self.value, index.value, as_integer(place), width)
         return tuple(Real(self.builder, column) for column in columns)
 
     def scatter(self, index: Address, place: Any, columns: tuple[Real, ...]) -> None:
         """Write what :meth:`gather` read."""
         values = [column.value for column in columns]
-        lanes.scatter(self.builder, self.value, index.value, _integer(place), values)
+        lanes.scatter(self.builder, self.value, index.value, as_integer(place), values)
 
     def prefetch(self, place: Any) -> None:
         """Ask for the cache line of an item."""
@@ -183,7 +203,7 @@ class Address:
 
     def prefetch_rows(self, index: Address, place: Any, width: int) -> None:
         """Ask for the rows that :meth:`gather` reads."""
-        lanes.prefetch_rows(self.builder, self.value, index.value, _integer(place), width)
+        lanes.prefetch_rows(self.builder, self.value, index.value, as_integer(place), width)
 
 
 class Table:
@@ -196,7 +216,7 @@ class Table:
         self.array = context.make_array(kind)(context, builder, value)
 
     def _item(self, key: Any) -> Any:
-        places = [_integer(k) for k in (key if isinstance(key, tuple) else (key,))]
+        places = [as_integer(k) for k in (key if isinstance(key, tuple) else (key,))]
         return cgutils.get_item_pointer(
             self.context, self.builder, self.kind, self.array, places, wraparound=False
         )
@@ -223,7 +243,8 @@ def as_double(builder: Any, x: Any) -> Any:
     return ir.Constant(DOUBLE, float(x))
 
 
-def _integer(x: Any) -> Any:
+def as_integer(x: Any) -> Any:
+    """The integer behind a number."""
     return x.value if isinstance(x, Whole) else ir.Constant(SIZE, int(x))
 
 

@@ -38,7 +38,7 @@ from granufab.kernels.contact_law import cone_defect, crossed_law, separate_law
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.options import part
 from granufab.kernels.slots import Slots, places
-from granufab.kernels.tracing import greatest, larger, summed, traced
+from granufab.kernels.tracing import greatest, larger, smaller, summed, traced
 from granufab.kernels.vectors import (
     add,
     axpy,
@@ -86,7 +86,7 @@ def numbers_of(law: Law):
 @part
 def lag_of(batch_count):
     """Batches between two moves of the cell."""
-    return max(1, min(LAG // WIDTH, batch_count // LAGS))
+    return larger(1, smaller(LAG // WIDTH, batch_count // LAGS))
 
 
 @part
@@ -117,7 +117,7 @@ def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     lag = lag_of(slots.starts[-1])
     until = lag
     for batch in range(start, end):
-        _announce(values, table, one, two, min(batch + AHEAD, end - 1), like)
+        _announce(values, table, one, two, smaller(batch + AHEAD, end - 1), like)
         for lane in range(0, WIDTH, stride(like)):
             base, place = batch * size + lane, batch * WIDTH + lane
             at = (values, one, two, table, base, place)
@@ -244,9 +244,9 @@ def defects(slots: Slots, bodies, shared: Law, reach, cell, like, size):
             else:
                 far, most, new, closing = _defect(at, law, dilation, like)
             total += far
-            worst = max(worst, most)
+            worst = larger(worst, most)
             length2 += new
-            violation = max(violation, closing)
+            violation = larger(violation, closing)
     return total, worst, length2, violation
 
 

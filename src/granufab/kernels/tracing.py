@@ -29,14 +29,17 @@ from granufab.kernels.standins import (
     Truth,
     Whole,
     as_double,
+    as_integer,
     is_lanes,
     number,
 )
 
 __all__ = [
     "choose",
+    "floor",
     "greatest",
     "larger",
+    "nearest",
     "root",
     "smaller",
     "spread",
@@ -133,8 +136,11 @@ def traced(function: F) -> F:
     return function
 
 
+@traced
 def whole(x: Any) -> Any:
-    """An integer as such, whatever array it comes from."""
+    """An integer as such, whatever array it comes from; of a double, what is before the point."""
+    if isinstance(x, Real):
+        return Whole(x.builder, x.builder.fptosi(x.value, lanes.SIZE))
     return x if isinstance(x, Whole) else int(x)
 
 
@@ -144,6 +150,8 @@ def choose(condition: Any, one: Any, two: Any) -> Any:
     if not isinstance(condition, Truth):
         return one if condition else two
     builder = condition.builder
+    if all(isinstance(x, (int, Whole)) for x in (one, two)):
+        return Whole(builder, builder.select(condition.value, as_integer(one), as_integer(two)))
     a, b = as_double(builder, one), as_double(builder, two)
     if condition.value.type != ir.IntType(1):
         a, b = lanes.spread(builder, a), lanes.spread(builder, b)
@@ -166,6 +174,18 @@ def smaller(a: Any, b: Any) -> Any:
 def root(x: Any) -> Any:
     """Square root."""
     return x.call("sqrt") if isinstance(x, Real) else math.sqrt(x)
+
+
+@traced
+def floor(x: Any) -> Any:
+    """Largest whole number that is not above x, as a double."""
+    return x.call("floor") if isinstance(x, Real) else float(math.floor(x))
+
+
+@traced
+def nearest(x: Any) -> Any:
+    """Nearest whole number, as a double; the even one of two."""
+    return x.call("rint") if isinstance(x, Real) else float(round(x))
 
 
 def spread(x: Any) -> Any:
