@@ -17,17 +17,17 @@ __all__ = ["empty", "unlinked", "zeros"]
 _ALIGNMENT = 64
 
 
-def empty(shape, dtype):
+def empty(shape: tuple[int, ...], dtype: Any) -> Any:
     """Array of a shape, a tuple; its numbers are to be written before they are read."""
     return np.empty(shape, dtype)
 
 
-def zeros(shape, dtype):
+def zeros(shape: tuple[int, ...], dtype: Any) -> Any:
     """Array of zeros; its shape is a tuple."""
     return np.zeros(shape, dtype)
 
 
-def unlinked(shape, dtype):
+def unlinked(shape: tuple[int, ...], dtype: Any) -> Any:
     """Array of integers that name nothing: −1 everywhere; its shape is a tuple."""
     return np.full(shape, -1, dtype)
 

@@ -51,8 +51,8 @@ config.CACHE_DIR = cache_folder()  # type: ignore[attr-defined]
 
 def kernel(function: F) -> F:
     """Compile ``function`` with the package's options, cached on disk, releasing the GIL."""
-    compiled: Any = njit(cache=True, nogil=True, no_cfunc_wrapper=True, **ARITHMETIC)(function)
-    return compiled
+    compiled: Any = njit
+    return compiled(cache=True, nogil=True, no_cfunc_wrapper=True, **ARITHMETIC)(function)
 
 
 def part(function: F) -> F:

@@ -257,8 +257,8 @@ def number(builder: Any, value: Any, kind: Any) -> Any:
     if kind == types.float64:
         return Real(builder, value)
     if isinstance(kind, types.Integer):
-        if kind.bitwidth < SIZE.width:
-            value = (builder.sext if kind.signed else builder.zext)(value, SIZE)
+        if value.type.width < SIZE.width:
+            value = (builder.zext if kind in types.unsigned_domain else builder.sext)(value, SIZE)
         return Whole(builder, value)
     raise TypingError(f"a traced function takes doubles and integers, not {kind}")
 

@@ -15,10 +15,10 @@ from typing import Any, TypeVar
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
-from numba.core.typing import signature
-from numba.core.typing.templates import AbstractTemplate, infer, infer_global
+from numba.core.typing.templates import AbstractTemplate, infer, infer_global, signature
 from numba.extending import lower_builtin
 
 from granufab.kernels import lanes
@@ -53,13 +53,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 def _stand_in(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """What a traced function sees of an argument."""
+    named = isinstance(kind, types.BaseNamedTuple)
     if isinstance(kind, types.BaseTuple):
-        items = [
-            _stand_in(context, builder, part, builder.extract_value(value, k))
-            for k, part in enumerate(kind)
-        ]
-        named = isinstance(kind, types.BaseNamedTuple)
-        return kind.instance_class(*items) if named else tuple(items)
+        values = cgutils.unpack_tuple(builder, value, len(kind))
+        items = [_stand_in(context, builder, *x) for x in zip(kinds, values, strict=True)]
+        named = getattr(kind, "instance_class", None)
+        return named(*items) if named else tuple(items)
     if isinstance(kind, types.Array):
         return Table(context, builder, value, kind)
     if isinstance(kind, types.CPointer):
@@ -99,7 +98,8 @@ def _value_of(context: Any, builder: Any, result: Any, kind: Any) -> Any:
 
 def _outlined(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
     """Type of the result: the function is run beside the kernel, and what it writes is dropped."""
-    context = cpu_target.target_context
+    target: Any = cpu_target
+    context = target.target_context
     shape = ir.FunctionType(ir.VoidType(), [context.get_value_type(kind) for kind in kinds])
     scratch = ir.Function(ir.Module(context=ir.Context()), shape, "scratch")
     builder = ir.IRBuilder(scratch.append_basic_block())
