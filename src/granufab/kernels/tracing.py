@@ -55,7 +55,8 @@ def _stand_in(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """What a traced function sees of an argument."""
     named = isinstance(kind, types.BaseNamedTuple)
     if isinstance(kind, types.BaseTuple):
-        values = cgutils.unpack_tuple(builder, value, len(kind))
+        kinds: Any = kind
+        values = cgutils.unpack_tuple(builder, value, len(kinds))
         items = [_stand_in(context, builder, *x) for x in zip(kinds, values, strict=True)]
         named = getattr(kind, "instance_class", None)
         return named(*items) if named else tuple(items)
