@@ -327,14 +327,9 @@ def _errors(
     replicas: int,
 ) -> dict[str, Value]:
     errors = bootstrap_errors(
-        packing,
-        criterion=rule,
-        z_definition=definition,
-        direction=direction,
-        minimum=minimum,
-        reach=reach,
-        replicas=replicas,
-    )
+        packing, criterion=rule, z_definition=definition, direction=direction,
+        minimum=minimum, reach=reach, replicas=replicas,
+    )  # fmt: skip
     return {f"{name}_error": value for name, value in errors.items()}
 
 

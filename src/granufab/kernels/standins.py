@@ -19,6 +19,7 @@ from granufab.kernels.options import ARITHMETIC
 __all__ = [
     "Address",
     "Real",
+    "Rows",
     "Table",
     "Truth",
     "Whole",
@@ -187,23 +188,37 @@ class Address:
         """Write eight neighbouring numbers."""
         lanes.store_lanes(self.builder, self.value, as_integer(place), value.value)
 
-    def gather(self, index: Address, place: Any, width: int) -> tuple[Real, ...]:
-        """Columns of eight rows of this table, see :func:`lanes.gather`."""
-        columns = lanes.gather(self.builder, self.value, index.value, as_integer(place), width)
-        return tuple(Real(self.builder, column) for column in columns)
-
-    def scatter(self, index: Address, place: Any, columns: tuple[Real, ...]) -> None:
-        """Write what :meth:`gather` read."""
-        values = [column.value for column in columns]
-        lanes.scatter(self.builder, self.value, index.value, as_integer(place), values)
+    def rows(self, index: Address, place: Any, width: int) -> Rows:
+        """The eight rows of this table that an index names at ``place``."""
+        found = lanes.rows_of(self.builder, self.value, index.value, as_integer(place), width)
+        return Rows(self.builder, found)
 
     def prefetch(self, place: Any) -> None:
         """Ask for the cache line of an item."""
         lanes.prefetch(self.builder, self._item(place))
 
-    def prefetch_rows(self, index: Address, place: Any, width: int) -> None:
-        """Ask for the rows that :meth:`gather` reads."""
-        lanes.prefetch_rows(self.builder, self.value, index.value, as_integer(place), width)
+
+class Rows:
+    """Stands for eight rows of a table."""
+
+    __slots__ = ("builder", "pointers")
+
+    def __init__(self, builder: Any, pointers: list[Any]) -> None:
+        self.builder, self.pointers = builder, pointers
+
+    def gather(self) -> tuple[Real, ...]:
+        """Their columns, see :func:`lanes.gather`."""
+        columns = lanes.gather(self.builder, self.pointers)
+        return tuple(Real(self.builder, column) for column in columns)
+
+    def scatter(self, columns: tuple[Real, ...]) -> None:
+        """Write what :meth:`gather` read."""
+        lanes.scatter(self.builder, self.pointers, [column.value for column in columns])
+
+    def prefetch(self) -> None:
+        """Ask for what :meth:`gather` reads, ahead of its use."""
+        for pointer in self.pointers:
+            lanes.prefetch(self.builder, pointer)
 
 
 class Table:

@@ -19,6 +19,7 @@ import numpy as np
 from granufab.kernels.access import (
     address,
     body_of,
+    find_body,
     inverse_mass_of,
     like_numbers,
     prefetch,
@@ -169,8 +170,8 @@ def _update(where, law, beta, dilation, cell, like):
     values, one, two, bodies, base, place = where
     numbers = like_numbers(like)
     at = places(numbers)
-    body_i = take_body(bodies, one, place, numbers)
-    body_j = take_body(bodies, two, place, numbers)
+    i, j = find_body(bodies, one, place, numbers), find_body(bodies, two, place, numbers)
+    body_i, body_j = take_body(bodies, i, numbers), take_body(bodies, j, numbers)
     n = take_vector(values, base, at.normal, numbers)
     length = take(values, base, at.length, numbers)
     x_n = take(values, base, at.impulse_n, numbers)
@@ -199,8 +200,8 @@ def _update(where, law, beta, dilation, cell, like):
     m_i, m_j = inverse_mass_of(body_i), inverse_mass_of(body_j)
     v_i = axpy(-m_i, push, velocity_of(body_i))
     v_j = axpy(m_j, push, velocity_of(body_j))
-    put_body(bodies, one, place, body_of(v_i, axpy(m_i, turn, spin_of(body_i)), body_i))
-    put_body(bodies, two, place, body_of(v_j, axpy(m_j, turn, spin_of(body_j)), body_j))
+    put_body(bodies, i, body_of(v_i, axpy(m_i, turn, spin_of(body_i)), body_i))
+    put_body(bodies, j, body_of(v_j, axpy(m_j, turn, spin_of(body_j)), body_j))
     if cell:
         _, scratch, weight = cell
         add_outer(scratch, weight, push, scale(length, n))
@@ -267,8 +268,8 @@ def _distance(where, law, dilation, cell, like):
     values, one, two, bodies, base, place = where
     numbers = like_numbers(like)
     at = places(numbers)
-    body_i = take_body(bodies, one, place, numbers)
-    body_j = take_body(bodies, two, place, numbers)
+    i, j = find_body(bodies, one, place, numbers), find_body(bodies, two, place, numbers)
+    body_i, body_j = take_body(bodies, i, numbers), take_body(bodies, j, numbers)
     n = take_vector(values, base, at.normal, numbers)
     length = take(values, base, at.length, numbers)
     p_n = take(values, base, at.impulse_n, numbers)
