@@ -62,12 +62,14 @@ def set_item(place, k, value):
     place[k] = value
 
 
+@traced
 def take(slots, at, field, like):
     """Item ``field`` of the contact (or eight contacts) at ``at``."""
     place = at + WIDTH * field
     return slots.lanes(place) if is_lanes(like[0]) else slots[place]
 
 
+@traced
 def put(slots, at, field, value):
     """Write item ``field`` of the contact (or eight contacts) at ``at``."""
     if is_lanes(value):
@@ -81,11 +83,13 @@ def take_vector(slots, at, field, like):
     return tuple(take(slots, at, field + k, like) for k in range(len(like)))
 
 
+@traced
 def take_tangent(slots, at, field, like):
     """Items from ``field`` on: what lies in the tangent plane, 1 number in 2D, 3 in 3D."""
     return tuple(take(slots, at, field + k, like) for k in range(1 if len(like) == 2 else 3))
 
 
+@traced
 def put_tangent(slots, at, field, value):
     """Write what :func:`take_tangent` read."""
     for k, x in enumerate(value):

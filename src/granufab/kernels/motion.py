@@ -12,8 +12,9 @@ from granufab.kernels.impulses import local_velocity
 from granufab.kernels.memory import empty, zeros
 from granufab.kernels.options import kernel
 from granufab.kernels.problem import Problem
-from granufab.kernels.tracing import larger, root
+from granufab.kernels.tracing import larger, root, traced
 from granufab.kernels.vectors import (
+    add,
     compose,
     dot,
     load,
@@ -142,8 +143,7 @@ def set_offsets(problem: Problem, gap, imposed, bounce, law, old_t, like):
             u_n += beta * gap[c] / step
         problem.offset_n[c] = u_n
         memory = scale(-problem.softness, load_tangent(old_t, c, like))
-        for k in range(len(u_t)):
-            problem.offset_t[c, k] = u_t[k] + memory[k]
+        store(problem.offset_t, c, add(u_t, memory))
 
 
 @kernel
@@ -170,10 +170,16 @@ def virial(problem: Problem, impulse_n, impulse_t, like):
     for c in range(len(problem.length)):
         n = load(problem.normal, c, like)
         push = compose(n, impulse_n[c], load_tangent(impulse_t, c, like))
-        for k in range(dimension):
-            for l in range(dimension):
-                total[k, l] += push[k] * n[l] * problem.length[c]
+        _add_product(total, push, scale(problem.length[c], n))
     return total
+
+
+@traced
+def _add_product(total, a, b):
+    """total += a⊗b."""
+    for k, x in enumerate(a):
+        for l, y in enumerate(b):
+            total[k, l] += x * y
 
 
 @kernel

@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granufab.kernels.access import address
+from granufab.kernels.access import address, put, put_tangent, set_item, take, take_tangent
 from granufab.kernels.cell import cell_weight
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.memory import empty, unlinked, zeros
 from granufab.kernels.options import kernel, part
 from granufab.kernels.problem import Problem
 from granufab.kernels.tracing import larger, smaller, traced
-from granufab.kernels.vectors import inverse_mass, load
+from granufab.kernels.vectors import inverse_mass, load, load_tangent, store
 
 __all__ = ["Slots", "fields", "pack", "places", "schedule", "unpack"]
 
@@ -156,45 +156,60 @@ def _home(chunk, i, j, grain_count, chunk_count):
 @kernel
 def pack(problem: Problem, motion, impulse_n, impulse_t, order, slots: Slots, like):
     """Fill the slots with the problem and its impulses; empty lanes get an open contact."""
-    values = slots.values
     size = fields(like, problem.coupled) * WIDTH
     at = places(like)
     spare = len(motion) - 1
     for slot in range(slots.starts[-1] * WIDTH):
         slots.first[slot], slots.second[slot] = spare, spare
     for k in range(slots.starts[-1] * size):
-        values[k] = 0.0
-    eps, kappa, weight = problem.softness, problem.spin_factor, address(problem.weight)
+        slots.values[k] = 0.0
+    values, weight = address(slots.values), address(problem.weight)
+    eps, kappa = problem.softness, problem.spin_factor
     for c in range(len(order)):
         slot = order[c]
         base = slot // WIDTH * size + slot % WIDTH
         i, j = problem.first[c], problem.second[c]
         slots.first[slot], slots.second[slot] = i, j
         n, length = load(problem.normal, c, like), problem.length[c]
-        for k in range(len(like)):
-            values[base + WIDTH * (at.normal + k)] = n[k]
-        values[base + WIDTH * at.length] = length
-        values[base + WIDTH * at.offset_n] = problem.offset_n[c]
-        values[base + WIDTH * at.mu] = problem.mu[c]
-        values[base + WIDTH * at.impulse_n] = impulse_n[c]
-        values[base + WIDTH * at.before_n] = impulse_n[c]
-        for k in range(impulse_t.shape[1]):
-            values[base + WIDTH * (at.offset_t + k)] = problem.offset_t[c, k]
-            values[base + WIDTH * (at.impulse_t + k)] = impulse_t[c, k]
-            values[base + WIDTH * (at.before_t + k)] = impulse_t[c, k]
+        offset = (problem.offset_n[c], load_tangent(problem.offset_t, c, like))
+        impulse = (impulse_n[c], load_tangent(impulse_t, c, like))
+        _write(values, base, n, length, problem.mu[c], offset, impulse)
         mass = inverse_mass(motion, i, like) + inverse_mass(motion, j, like)
         w_n, w_t = mass + eps, mass + kappa * mass + eps
         if problem.coupled:
-            extra_n, extra_nt, extra_t = cell_weight(weight, n, length)
-            w_n, w_t = w_n + extra_n, w_t + extra_t
-            if len(like) == 2:
-                values[base + WIDTH * at.cross] = extra_nt
+            _write_coupled(values, base, weight, n, length, w_n, w_t)
         else:
             w_n += length * length * problem.dilation_weight
-        crossed = problem.coupled and len(like) == 2
-        values[base + WIDTH * at.inverse_n] = w_n if crossed else 1.0 / w_n
-        values[base + WIDTH * at.inverse_t] = w_t if crossed else 1.0 / w_t
+            set_item(values, base + WIDTH * at.inverse_n, 1.0 / w_n)
+            set_item(values, base + WIDTH * at.inverse_t, 1.0 / w_t)
     _fill_empty(slots, size, at, spare)
+
+
+@traced
+def _write(values, base, n, length, mu, offset, impulse):
+    """What a contact has whatever the cell is free to do; it starts without momentum."""
+    at = places(n)
+    put_tangent(values, base, at.normal, n)
+    put(values, base, at.length, length)
+    put(values, base, at.offset_n, offset[0])
+    put_tangent(values, base, at.offset_t, offset[1])
+    put(values, base, at.mu, mu)
+    for first_n, first_t in ((at.impulse_n, at.impulse_t), (at.before_n, at.before_t)):
+        put(values, base, first_n, impulse[0])
+        put_tangent(values, base, first_t, impulse[1])
+
+
+@traced
+def _write_coupled(values, base, weight, n, length, w_n, w_t):
+    """W_nn + ε, W_tt + ε with the share of a cell free to change its shape, see :class:`Places`."""
+    at = places(n)
+    extra_n, extra_nt, extra_t = cell_weight(weight, n, length)
+    w_n, w_t = w_n + extra_n, w_t + extra_t
+    crossed = len(n) == 2
+    put(values, base, at.inverse_n, w_n if crossed else 1.0 / w_n)
+    put(values, base, at.inverse_t, w_t if crossed else 1.0 / w_t)
+    if crossed:
+        put(values, base, at.cross, extra_nt)
 
 
 @part
@@ -210,10 +225,9 @@ def _fill_empty(slots: Slots, size, at, spare):
 @kernel
 def unpack(slots: Slots, size, order, impulse_n, impulse_t, like):
     """Write the impulses of the slots back, in the order of the problem."""
-    at = places(like)
+    at, values = places(like), address(slots.values)
     for c in range(len(order)):
         slot = order[c]
         base = slot // WIDTH * size + slot % WIDTH
-        impulse_n[c] = slots.values[base + WIDTH * at.impulse_n]
-        for k in range(impulse_t.shape[1]):
-            impulse_t[c, k] = slots.values[base + WIDTH * (at.impulse_t + k)]
+        impulse_n[c] = take(values, base, at.impulse_n, like)
+        store(impulse_t, c, take_tangent(values, base, at.impulse_t, like))
