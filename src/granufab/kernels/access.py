@@ -14,6 +14,7 @@ from granufab.kernels.tracing import spread, traced, whole
 __all__ = [
     "address",
     "body_of",
+    "find_body",
     "inverse_mass_of",
     "item",
     "like_numbers",
@@ -61,12 +62,14 @@ def set_item(place, k, value):
     place[k] = value
 
 
+@traced
 def take(slots, at, field, like):
     """Item ``field`` of the contact (or eight contacts) at ``at``."""
     place = at + WIDTH * field
     return slots.lanes(place) if is_lanes(like[0]) else slots[place]
 
 
+@traced
 def put(slots, at, field, value):
     """Write item ``field`` of the contact (or eight contacts) at ``at``."""
     if is_lanes(value):
@@ -80,34 +83,41 @@ def take_vector(slots, at, field, like):
     return tuple(take(slots, at, field + k, like) for k in range(len(like)))
 
 
+@traced
 def take_tangent(slots, at, field, like):
     """Items from ``field`` on: what lies in the tangent plane, 1 number in 2D, 3 in 3D."""
     return tuple(take(slots, at, field + k, like) for k in range(1 if len(like) == 2 else 3))
 
 
+@traced
 def put_tangent(slots, at, field, value):
     """Write what :func:`take_tangent` read."""
     for k, x in enumerate(value):
         put(slots, at, field + k, x)
 
 
-def take_body(bodies, index, place, like):
-    """All numbers of the body (or eight bodies) that ``index`` names at ``place``."""
+def find_body(bodies, index, place, like):
+    """Where the body (or eight bodies) that ``index`` names at ``place`` lies."""
     width = _body_width(like)
     if is_lanes(like[0]):
-        return bodies.gather(index, place, width)
-    first = whole(index[place]) * width
-    return tuple(bodies[first + k] for k in range(width))
+        return bodies.rows(index, place, width)
+    return whole(index[place]) * width
 
 
-def put_body(bodies, index, place, body):
+def take_body(bodies, where, like):
+    """All numbers of a body (or eight bodies)."""
+    if is_lanes(like[0]):
+        return where.gather()
+    return tuple(bodies[where + k] for k in range(_body_width(like)))
+
+
+def put_body(bodies, where, body):
     """Write what :func:`take_body` read; of one body, what moves."""
     if is_lanes(body[0]):
-        bodies.scatter(index, place, body)
+        where.scatter(body)
         return
-    first = whole(index[place]) * len(body)
     for k, x in enumerate((*velocity_of(body), *spin_of(body))):
-        bodies[first + k] = x
+        bodies[where + k] = x
 
 
 @traced
@@ -116,7 +126,7 @@ def prefetch(slots, bodies, one, two, batch, size, like):
     if not isinstance(like[0], tuple):
         return
     for index in (one, two):
-        bodies.prefetch_rows(index, batch * WIDTH, _body_width(like[0]))
+        bodies.rows(index, batch * WIDTH, _body_width(like[0])).prefetch()
     for field in range(size):
         slots.prefetch((batch * size + field) * WIDTH)
 

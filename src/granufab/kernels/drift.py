@@ -6,8 +6,6 @@ part is applied as exp(h L/2) on each half step, so imposed strains are exact.
 
 from __future__ import annotations
 
-import math
-
 from granufab.kernels.options import part
 from granufab.kernels.step_arrays import (
     FARTHEST,
@@ -22,6 +20,7 @@ from granufab.kernels.step_arrays import (
     piece_of,
 )
 from granufab.kernels.team import meet
+from granufab.kernels.tracing import larger, root
 from granufab.kernels.vectors import axpy, load, matvec, norm2, store
 
 __all__ = ["exponential", "half_drift"]
@@ -73,7 +72,7 @@ def _move_grains(bodies: Bodies, affine, half, piece, like):
         store(bodies.position, i, axpy(half, c, matvec(affine, load(bodies.position, i, like))))
         walked = axpy(half, c, load(bodies.walked, i, like))
         store(bodies.walked, i, walked)
-        farthest = max(farthest, norm2(walked))
+        farthest = larger(farthest, norm2(walked))
     return farthest
 
 
@@ -99,8 +98,8 @@ def _move_cell(box: Box, notes: Notes, affine, half):
     for k in range(dimension):
         for l in range(dimension):
             matrix[k, l] = moved[k, l]
-    notes.control[STRAIN_WALKED] += half * math.sqrt(square)
+    notes.control[STRAIN_WALKED] += half * root(square)
     farthest = 0.0
     for piece in range(PIECES):
-        farthest = max(farthest, notes.partial[piece, 0])
-    notes.control[FARTHEST] = math.sqrt(farthest)
+        farthest = larger(farthest, notes.partial[piece, 0])
+    notes.control[FARTHEST] = root(farthest)

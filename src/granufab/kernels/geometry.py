@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
 from granufab.kernels.options import part
 from granufab.kernels.step_arrays import (
     MATRIX,
@@ -17,6 +13,7 @@ from granufab.kernels.step_arrays import (
     StepLaw,
     piece_of,
 )
+from granufab.kernels.tracing import root, smaller
 from granufab.kernels.vectors import (
     add,
     dot,
@@ -47,7 +44,7 @@ def survey(bodies: Bodies, box: Box, pairs: Pairs, notes: Notes, law: StepLaw, l
         turn_tangents(pairs.impulse_t, pairs.normal, reach, like)
     smallest = 0.0
     for c in range(first, end):
-        smallest = min(smallest, pairs.gap[c])
+        smallest = smaller(smallest, pairs.gap[c])
         store(pairs.memory_t, c, load_tangent(pairs.impulse_t, c, like))
     notes.partial[piece, 1] = smallest
     _select(bodies.motion, pairs, box.tensors[RATE], law, reach, like)
@@ -105,7 +102,7 @@ def turn_tangents(impulse_t, normal, reach, like):
         turned = tangential(before, n, dot(n, before))
         kept = norm2(turned)
         if kept > 0.0:
-            store(impulse_t, c, scale(np.sqrt(size / kept), turned))
+            store(impulse_t, c, scale(root(size / kept), turned))
         else:
             store(impulse_t, c, scale(0.0, before))
 
@@ -121,7 +118,7 @@ def _select(motion, pairs: Pairs, rate, law: StepLaw, reach, like):
     for k in range(len(rate)):
         for l in range(len(rate)):
             square += rate[k, l] ** 2
-    stretch = law.step * math.sqrt(square)
+    stretch = law.step * root(square)
     for c in range(reach[0], reach[1]):
         gap = pairs.gap[c]
         if law.restitution > 0.0:

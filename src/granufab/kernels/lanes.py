@@ -22,7 +22,7 @@ __all__ = [
     "item_of",
     "load_lanes",
     "prefetch",
-    "prefetch_rows",
+    "rows_of",
     "scatter",
     "spread",
     "store_lanes",
@@ -82,7 +82,7 @@ def store_lanes(builder: Any, address: Any, place: Any, value: Any) -> None:
     builder.store(value, _wide(builder, item_of(builder, address, place), WIDTH), align=8)
 
 
-def _rows(builder: Any, table: Any, index: Any, place: Any, width: int) -> list[Any]:
+def rows_of(builder: Any, table: Any, index: Any, place: Any, width: int) -> list[Any]:
     """Pointers to the rows that eight neighbouring entries of an index name."""
     first = item_of(builder, index, place)
     pointers = []
@@ -100,12 +100,6 @@ def prefetch(builder: Any, pointer: Any) -> None:
     function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
     hints = [ir.Constant(number, hint) for hint in (1, 3, 1)]
     builder.call(function, [builder.bitcast(pointer, byte), *hints])
-
-
-def prefetch_rows(builder: Any, table: Any, index: Any, place: Any, width: int) -> None:
-    """Ask for the rows that :func:`gather` reads, ahead of their use."""
-    for pointer in _rows(builder, table, index, place, width):
-        prefetch(builder, pointer)
 
 
 def _interleave(builder: Any, values: list[Any], span: int) -> list[Any]:
@@ -131,20 +125,18 @@ def _turn(builder: Any, values: list[Any]) -> list[Any]:
     return values
 
 
-def gather(builder: Any, table: Any, index: Any, place: Any, width: int) -> list[Any]:
-    """Columns of the rows table[index[place : place + 8]] of 4 or 8 numbers, each as lanes."""
-    rows = [builder.load(p, align=8) for p in _rows(builder, table, index, place, width)]
-    if width == 4:
+def gather(builder: Any, pointers: Sequence[Any]) -> list[Any]:
+    """Columns of eight rows of 4 or 8 numbers, each as lanes."""
+    rows = [builder.load(pointer, align=8) for pointer in pointers]
+    if rows[0].type.count == 4:
         rows = [_shuffle(builder, rows[k], rows[k + 4], range(WIDTH)) for k in range(4)]
     return _turn(builder, rows)
 
 
-def scatter(builder: Any, table: Any, index: Any, place: Any, columns: list[Any]) -> None:
+def scatter(builder: Any, pointers: Sequence[Any], columns: list[Any]) -> None:
     """Write what :func:`gather` reads; rows named twice must get the same numbers."""
-    width = len(columns)
-    pointers = _rows(builder, table, index, place, width)
     rows = _turn(builder, columns)
-    if width == 4:
+    if len(columns) == 4:
         parts = [_halves(builder, row, WIDTH) for row in rows]
         rows = [low for low, _ in parts] + [high for _, high in parts]
     for pointer, row in zip(pointers, rows, strict=True):

@@ -12,8 +12,10 @@ from typing import Any
 
 import numpy as np
 
+from granufab.kernels.memory import empty, zeros
 from granufab.kernels.options import kernel, part, steady
 from granufab.kernels.step_arrays import PIECES, piece_of
+from granufab.kernels.tracing import floor, larger, root, smaller, whole
 
 __all__ = ["bin_counts", "find_pairs", "find_wall_pairs", "morton_order"]
 
@@ -22,12 +24,12 @@ __all__ = ["bin_counts", "find_pairs", "find_wall_pairs", "morton_order"]
 def bin_counts(inverse, reach, periodic):
     """Bins per axis so that a bin is at least ``reach`` wide; 1 where fewer than 3 would fit."""
     dimension = len(inverse)
-    counts = np.ones(dimension, np.int64)
+    counts = empty((dimension,), np.int64)
     for k in range(dimension):
         square = 0.0
         for l in range(dimension):
             square += inverse[k, l] ** 2
-        number = int(1.0 / (np.sqrt(square) * reach))
+        number = whole(1.0 / (root(square) * reach))
         counts[k] = number if number >= (3 if periodic[k] else 1) else 1
     return counts
 
@@ -37,15 +39,15 @@ def _sort_into_bins(position, radius, origin, inverse, periodic, skin):
     count, dimension = position.shape
     largest = 0.0
     for i in range(count):
-        largest = max(largest, radius[i])
+        largest = larger(largest, radius[i])
     counts = bin_counts(inverse, 2.0 * largest + skin, periodic)
     total = 1
     for k in range(dimension):
         total *= counts[k]
-    where = np.empty((count, dimension), np.int64)
-    shift = np.zeros((count, dimension), np.int64)
-    start = np.zeros(total + 1, np.int64)
-    flat = np.empty(count, np.int64)
+    where = empty((count, dimension), np.int64)
+    shift = zeros((count, dimension), np.int64)
+    start = zeros((total + 1,), np.int64)
+    flat = empty((count,), np.int64)
     for i in range(count):
         index = 0
         for k in range(dimension):
@@ -53,18 +55,20 @@ def _sort_into_bins(position, radius, origin, inverse, periodic, skin):
             for l in range(dimension):
                 s += inverse[k, l] * (position[i, l] - origin[l])
             if periodic[k]:
-                whole = np.floor(s)
-                shift[i, k] = int(whole)
-                s -= whole
-            place = min(max(int(s * counts[k]), 0), counts[k] - 1)
+                turns = floor(s)
+                shift[i, k] = whole(turns)
+                s -= turns
+            place = smaller(larger(whole(s * counts[k]), 0), counts[k] - 1)
             where[i, k] = place
             index = index * counts[k] + place
         flat[i] = index
         start[index + 1] += 1
     for b in range(total):
         start[b + 1] += start[b]
-    items = np.empty(count, np.int64)
-    fill = start.copy()
+    items = empty((count,), np.int64)
+    fill = empty((total,), np.int64)
+    for b in range(total):
+        fill[b] = start[b]
     for i in range(count):
         items[fill[flat[i]]] = i
         fill[flat[i]] += 1
@@ -179,7 +183,7 @@ def _is_near(position, radius, matrix, shift, image, skin, i, j):
 def find_wall_pairs(position, radius, matrix, origin, periodic, skin, capacity):
     """Pairs of a grain and a flat wall 2·axis + side within ``skin``; as (pairs, count)."""
     count, dimension = position.shape
-    pairs = np.empty((capacity, 2), np.int32)
+    pairs = empty((capacity, 2), np.int32)
     found = 0
     for i in range(count):
         for k in range(dimension):
@@ -206,13 +210,13 @@ def _morton_keys(position, origin, inverse):
     """Place of every grain along the curve."""
     count, dimension = position.shape
     bits = 20 if dimension == 3 else 30
-    keys = np.zeros(count, np.int64)
+    keys = zeros((count,), np.int64)
     for i in range(count):
         for k in range(dimension):
             s = 0.0
             for l in range(dimension):
                 s += inverse[k, l] * (position[i, l] - origin[l])
-            place = int((s - np.floor(s)) * 2.0**bits)
+            place = whole((s - floor(s)) * 2.0**bits)
             for bit in range(bits):
                 keys[i] |= ((place >> bit) & 1) << (bit * dimension + k)
     return keys

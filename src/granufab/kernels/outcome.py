@@ -38,6 +38,7 @@ from granufab.kernels.step_arrays import (
     StepLaw,
     piece_of,
 )
+from granufab.kernels.tracing import larger, smaller
 
 __all__ = ["finish_step", "inspect", "report_step"]
 
@@ -73,7 +74,7 @@ def finish_step(box: Box, notes: Notes, law: StepLaw):
     scale = 1.0 / (law.step * determinant(tensors[MATRIX]))
     broken, smallest = float(_broken(box.bits[RATE])), 0.0
     for piece in range(PIECES):
-        smallest = min(smallest, partial[piece, 1])
+        smallest = smaller(smallest, partial[piece, 1])
         broken += partial[piece, 3]
     control[OVERLAP] = -smallest
     largest = 0.0
@@ -83,7 +84,7 @@ def finish_step(box: Box, notes: Notes, law: StepLaw):
             for piece in range(PIECES):
                 total += partial[piece, 4 + k * dimension + l]
             tensors[STRESS, k, l] = scale * total
-            largest = max(largest, abs(tensors[RATE, k, l] - tensors[IMPOSED, k, l]))
+            largest = larger(largest, abs(tensors[RATE, k, l] - tensors[IMPOSED, k, l]))
     if largest > law.rate_cap:
         for k in range(dimension):
             for l in range(dimension):

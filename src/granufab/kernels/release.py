@@ -18,6 +18,7 @@ from granufab.kernels.step_arrays import (
     copy_numbers,
     piece_of,
 )
+from granufab.kernels.tracing import smaller
 
 __all__ = ["determinant", "free_rates", "release"]
 
@@ -36,7 +37,7 @@ def release(bodies: Bodies, box: Box, law: StepLaw, like, piece):
     kept = 1.0 - law.damping
     width = motion.shape[1]
     copy_numbers(address(motion), address(free), first * width, end * width)
-    for i in range(first, min(end, grain_count)):
+    for i in range(first, smaller(end, grain_count)):
         for k in range(dimension):
             free[i, k] += law.step * box.gravity[k]
         for k in range(moving):

@@ -13,6 +13,7 @@ import numpy as np
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.options import kernel, part
 from granufab.kernels.step_arrays import PIECES
+from granufab.kernels.tracing import larger, smaller
 
 __all__ = ["Plan", "arrange_chunk", "home_of", "list_homes", "place_chunks", "schedule"]
 
@@ -111,9 +112,9 @@ def arrange_chunk(plan: Plan, first, second, home):
     for at in range(head, end):
         c = plan.listed[_mixed(at, head, end)]
         i, j = first[c], second[c]
-        batch = max(low, plan.last[i] + 1)
+        batch = larger(low, plan.last[i] + 1)
         if j < grain_count:
-            batch = max(batch, plan.last[j] + 1)
+            batch = larger(batch, plan.last[j] + 1)
         while taken[batch] == WIDTH:
             batch += 1
         plan.order[c] = batch * WIDTH + taken[batch]
@@ -121,7 +122,7 @@ def arrange_chunk(plan: Plan, first, second, home):
         plan.last[i] = batch
         if j < grain_count:
             plan.last[j] = batch
-        top = max(top, batch + 1)
+        top = larger(top, batch + 1)
         while taken[low] == WIDTH:
             low += 1
     plan.starts[home + 1] = top
@@ -131,7 +132,7 @@ def arrange_chunk(plan: Plan, first, second, home):
 def _mixed(at, head, end):
     """Visit each block in leaps: contacts in a row share grains and would have to queue."""
     start = head + (at - head) // BLOCK * BLOCK
-    size = min(BLOCK, end - start)
+    size = smaller(BLOCK, end - start)
     return start + (at - start) * LEAP % size
 
 

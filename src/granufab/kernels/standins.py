@@ -16,7 +16,18 @@ from granufab.kernels import lanes
 from granufab.kernels.lanes import DOUBLE, LANES, SIZE, WIDTH
 from granufab.kernels.options import ARITHMETIC
 
-__all__ = ["Address", "Real", "Table", "Truth", "Whole", "as_double", "is_lanes", "number"]
+__all__ = [
+    "Address",
+    "Real",
+    "Rows",
+    "Table",
+    "Truth",
+    "Whole",
+    "as_double",
+    "as_integer",
+    "is_lanes",
+    "number",
+]
 
 _FLAGS = tuple(sorted(ARITHMETIC["fastmath"]))
 
@@ -132,14 +143,24 @@ class Whole:
     def __add__(self, other: Any) -> Whole:
         if isinstance(other, Real):
             return NotImplemented
-        return Whole(self.builder, self.builder.add(self.value, _integer(other)))
+        return Whole(self.builder, self.builder.add(self.value, as_integer(other)))
 
     def __mul__(self, other: Any) -> Whole:
         if isinstance(other, Real):
             return NotImplemented
-        return Whole(self.builder, self.builder.mul(self.value, _integer(other)))
+        return Whole(self.builder, self.builder.mul(self.value, as_integer(other)))
 
     __radd__, __rmul__ = __add__, __mul__
+
+    def _compare(self, sign: str, other: Any) -> Truth:
+        answer = self.builder.icmp_signed(sign, self.value, as_integer(other))
+        return Truth(self.builder, answer)
+
+    def __lt__(self, other: Any) -> Truth:
+        return self._compare("<", other)
+
+    def __gt__(self, other: Any) -> Truth:
+        return self._compare(">", other)
 
 
 class Address:
@@ -157,33 +178,47 @@ class Address:
         self.builder.store(as_double(self.builder, value), self._item(place))
 
     def _item(self, place: Any) -> Any:
-        return lanes.item_of(self.builder, self.value, _integer(place))
+        return lanes.item_of(self.builder, self.value, as_integer(place))
 
     def lanes(self, place: Any) -> Real:
         """Eight neighbouring numbers."""
-        return Real(self.builder, lanes.load_lanes(self.builder, self.value, _integer(place)))
+        return Real(self.builder, lanes.load_lanes(self.builder, self.value, as_integer(place)))
 
     def put_lanes(self, place: Any, value: Real) -> None:
         """Write eight neighbouring numbers."""
-        lanes.store_lanes(self.builder, self.value, _integer(place), value.value)
+        lanes.store_lanes(self.builder, self.value, as_integer(place), value.value)
 
-    def gather(self, index: Address, place: Any, width: int) -> tuple[Real, ...]:
-        """Columns of eight rows of this table, see :func:`lanes.gather`."""
-        columns = lanes.gather(self.builder, self.value, index.value, _integer(place), width)
-        return tuple(Real(self.builder, column) for column in columns)
-
-    def scatter(self, index: Address, place: Any, columns: tuple[Real, ...]) -> None:
-        """Write what :meth:`gather` read."""
-        values = [column.value for column in columns]
-        lanes.scatter(self.builder, self.value, index.value, _integer(place), values)
+    def rows(self, index: Address, place: Any, width: int) -> Rows:
+        """The eight rows of this table that an index names at ``place``."""
+        found = lanes.rows_of(self.builder, self.value, index.value, as_integer(place), width)
+        return Rows(self.builder, found)
 
     def prefetch(self, place: Any) -> None:
         """Ask for the cache line of an item."""
         lanes.prefetch(self.builder, self._item(place))
 
-    def prefetch_rows(self, index: Address, place: Any, width: int) -> None:
-        """Ask for the rows that :meth:`gather` reads."""
-        lanes.prefetch_rows(self.builder, self.value, index.value, _integer(place), width)
+
+class Rows:
+    """Stands for eight rows of a table."""
+
+    __slots__ = ("builder", "pointers")
+
+    def __init__(self, builder: Any, pointers: list[Any]) -> None:
+        self.builder, self.pointers = builder, pointers
+
+    def gather(self) -> tuple[Real, ...]:
+        """Their columns, see :func:`lanes.gather`."""
+        columns = lanes.gather(self.builder, self.pointers)
+        return tuple(Real(self.builder, column) for column in columns)
+
+    def scatter(self, columns: tuple[Real, ...]) -> None:
+        """Write what :meth:`gather` read."""
+        lanes.scatter(self.builder, self.pointers, [column.value for column in columns])
+
+    def prefetch(self) -> None:
+        """Ask for what :meth:`gather` reads, ahead of its use."""
+        for pointer in self.pointers:
+            lanes.prefetch(self.builder, pointer)
 
 
 class Table:
@@ -196,7 +231,7 @@ class Table:
         self.array = context.make_array(kind)(context, builder, value)
 
     def _item(self, key: Any) -> Any:
-        places = [_integer(k) for k in (key if isinstance(key, tuple) else (key,))]
+        places = [as_integer(k) for k in (key if isinstance(key, tuple) else (key,))]
         return cgutils.get_item_pointer(
             self.context, self.builder, self.kind, self.array, places, wraparound=False
         )
@@ -223,7 +258,8 @@ def as_double(builder: Any, x: Any) -> Any:
     return ir.Constant(DOUBLE, float(x))
 
 
-def _integer(x: Any) -> Any:
+def as_integer(x: Any) -> Any:
+    """The integer behind a number."""
     return x.value if isinstance(x, Whole) else ir.Constant(SIZE, int(x))
 
 
@@ -236,8 +272,8 @@ def number(builder: Any, value: Any, kind: Any) -> Any:
     if kind == types.float64:
         return Real(builder, value)
     if isinstance(kind, types.Integer):
-        if kind.bitwidth < SIZE.width:
-            value = (builder.sext if kind.signed else builder.zext)(value, SIZE)
+        if value.type.width < SIZE.width:
+            value = (builder.zext if kind in types.unsigned_domain else builder.sext)(value, SIZE)
         return Whole(builder, value)
     raise TypingError(f"a traced function takes doubles and integers, not {kind}")
 

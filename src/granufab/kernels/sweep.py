@@ -19,6 +19,7 @@ import numpy as np
 from granufab.kernels.access import (
     address,
     body_of,
+    find_body,
     inverse_mass_of,
     like_numbers,
     prefetch,
@@ -38,7 +39,7 @@ from granufab.kernels.contact_law import cone_defect, crossed_law, separate_law
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.options import part
 from granufab.kernels.slots import Slots, places
-from granufab.kernels.tracing import greatest, larger, summed, traced
+from granufab.kernels.tracing import greatest, larger, smaller, summed, traced
 from granufab.kernels.vectors import (
     add,
     axpy,
@@ -86,7 +87,7 @@ def numbers_of(law: Law):
 @part
 def lag_of(batch_count):
     """Batches between two moves of the cell."""
-    return max(1, min(LAG // WIDTH, batch_count // LAGS))
+    return larger(1, smaller(LAG // WIDTH, batch_count // LAGS))
 
 
 @part
@@ -117,7 +118,7 @@ def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     lag = lag_of(slots.starts[-1])
     until = lag
     for batch in range(start, end):
-        _announce(values, table, one, two, min(batch + AHEAD, end - 1), like)
+        _announce(values, table, one, two, smaller(batch + AHEAD, end - 1), like)
         for lane in range(0, WIDTH, stride(like)):
             base, place = batch * size + lane, batch * WIDTH + lane
             at = (values, one, two, table, base, place)
@@ -169,8 +170,8 @@ def _update(where, law, beta, dilation, cell, like):
     values, one, two, bodies, base, place = where
     numbers = like_numbers(like)
     at = places(numbers)
-    body_i = take_body(bodies, one, place, numbers)
-    body_j = take_body(bodies, two, place, numbers)
+    i, j = find_body(bodies, one, place, numbers), find_body(bodies, two, place, numbers)
+    body_i, body_j = take_body(bodies, i, numbers), take_body(bodies, j, numbers)
     n = take_vector(values, base, at.normal, numbers)
     length = take(values, base, at.length, numbers)
     x_n = take(values, base, at.impulse_n, numbers)
@@ -199,8 +200,8 @@ def _update(where, law, beta, dilation, cell, like):
     m_i, m_j = inverse_mass_of(body_i), inverse_mass_of(body_j)
     v_i = axpy(-m_i, push, velocity_of(body_i))
     v_j = axpy(m_j, push, velocity_of(body_j))
-    put_body(bodies, one, place, body_of(v_i, axpy(m_i, turn, spin_of(body_i)), body_i))
-    put_body(bodies, two, place, body_of(v_j, axpy(m_j, turn, spin_of(body_j)), body_j))
+    put_body(bodies, i, body_of(v_i, axpy(m_i, turn, spin_of(body_i)), body_i))
+    put_body(bodies, j, body_of(v_j, axpy(m_j, turn, spin_of(body_j)), body_j))
     if cell:
         _, scratch, weight = cell
         add_outer(scratch, weight, push, scale(length, n))
@@ -244,9 +245,9 @@ def defects(slots: Slots, bodies, shared: Law, reach, cell, like, size):
             else:
                 far, most, new, closing = _defect(at, law, dilation, like)
             total += far
-            worst = max(worst, most)
+            worst = larger(worst, most)
             length2 += new
-            violation = max(violation, closing)
+            violation = larger(violation, closing)
     return total, worst, length2, violation
 
 
@@ -267,8 +268,8 @@ def _distance(where, law, dilation, cell, like):
     values, one, two, bodies, base, place = where
     numbers = like_numbers(like)
     at = places(numbers)
-    body_i = take_body(bodies, one, place, numbers)
-    body_j = take_body(bodies, two, place, numbers)
+    i, j = find_body(bodies, one, place, numbers), find_body(bodies, two, place, numbers)
+    body_i, body_j = take_body(bodies, i, numbers), take_body(bodies, j, numbers)
     n = take_vector(values, base, at.normal, numbers)
     length = take(values, base, at.length, numbers)
     p_n = take(values, base, at.impulse_n, numbers)

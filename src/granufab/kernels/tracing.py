@@ -15,10 +15,10 @@ from typing import Any, TypeVar
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
-from numba.core.typing import signature
-from numba.core.typing.templates import AbstractTemplate, infer, infer_global
+from numba.core.typing.templates import AbstractTemplate, infer, infer_global, signature
 from numba.extending import lower_builtin
 
 from granufab.kernels import lanes
@@ -29,14 +29,17 @@ from granufab.kernels.standins import (
     Truth,
     Whole,
     as_double,
+    as_integer,
     is_lanes,
     number,
 )
 
 __all__ = [
     "choose",
+    "floor",
     "greatest",
     "larger",
+    "nearest",
     "root",
     "smaller",
     "spread",
@@ -50,13 +53,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 def _stand_in(context: Any, builder: Any, kind: Any, value: Any) -> Any:
     """What a traced function sees of an argument."""
+    named = isinstance(kind, types.BaseNamedTuple)
     if isinstance(kind, types.BaseTuple):
-        items = [
-            _stand_in(context, builder, part, builder.extract_value(value, k))
-            for k, part in enumerate(kind)
-        ]
-        named = isinstance(kind, types.BaseNamedTuple)
-        return kind.instance_class(*items) if named else tuple(items)
+        kinds: Any = kind
+        values = cgutils.unpack_tuple(builder, value, len(kinds))
+        items = [_stand_in(context, builder, *x) for x in zip(kinds, values, strict=True)]
+        named = getattr(kind, "instance_class", None)
+        return named(*items) if named else tuple(items)
     if isinstance(kind, types.Array):
         return Table(context, builder, value, kind)
     if isinstance(kind, types.CPointer):
@@ -96,7 +99,8 @@ def _value_of(context: Any, builder: Any, result: Any, kind: Any) -> Any:
 
 def _outlined(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
     """Type of the result: the function is run beside the kernel, and what it writes is dropped."""
-    context = cpu_target.target_context
+    target: Any = cpu_target
+    context = target.target_context
     shape = ir.FunctionType(ir.VoidType(), [context.get_value_type(kind) for kind in kinds])
     scratch = ir.Function(ir.Module(context=ir.Context()), shape, "scratch")
     builder = ir.IRBuilder(scratch.append_basic_block())
@@ -133,8 +137,11 @@ def traced(function: F) -> F:
     return function
 
 
+@traced
 def whole(x: Any) -> Any:
-    """An integer as such, whatever array it comes from."""
+    """An integer as such, whatever array it comes from; of a double, what is before the point."""
+    if isinstance(x, Real):
+        return Whole(x.builder, x.builder.fptosi(x.value, lanes.SIZE))
     return x if isinstance(x, Whole) else int(x)
 
 
@@ -144,6 +151,8 @@ def choose(condition: Any, one: Any, two: Any) -> Any:
     if not isinstance(condition, Truth):
         return one if condition else two
     builder = condition.builder
+    if all(isinstance(x, (int, Whole)) for x in (one, two)):
+        return Whole(builder, builder.select(condition.value, as_integer(one), as_integer(two)))
     a, b = as_double(builder, one), as_double(builder, two)
     if condition.value.type != ir.IntType(1):
         a, b = lanes.spread(builder, a), lanes.spread(builder, b)
@@ -166,6 +175,18 @@ def smaller(a: Any, b: Any) -> Any:
 def root(x: Any) -> Any:
     """Square root."""
     return x.call("sqrt") if isinstance(x, Real) else math.sqrt(x)
+
+
+@traced
+def floor(x: Any) -> Any:
+    """Largest whole number that is not above x, as a double."""
+    return x.call("floor") if isinstance(x, Real) else float(math.floor(x))
+
+
+@traced
+def nearest(x: Any) -> Any:
+    """Nearest whole number, as a double; the even one of two."""
+    return x.call("rint") if isinstance(x, Real) else float(round(x))
 
 
 def spread(x: Any) -> Any:
