@@ -19,7 +19,7 @@ def solve(problem, state, tolerance, max_sweeps, cap=0.0, *, floor=1e-3, wide=Fa
     solver = ContactSolver(BODIES, problem.normal.shape[1], wide=wide)
     solver.chunk_count = chunks
     solver.chunk[:] = np.arange(BODIES) % chunks
-    return solver.solve(problem, state, (tolerance, max_sweeps, cap, floor))
+    return solver.solve(problem, state, (tolerance, max_sweeps, cap, floor))[:4]
 
 
 def residual(problem, state, floor, *, wide=False):

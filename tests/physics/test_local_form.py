@@ -92,7 +92,7 @@ def test_a_rigid_step_is_solved_to_round_off(seed: int) -> None:
     problem = local_form(simulation.problem, simulation.state)
     found = solve_local(problem.W, problem.q, problem.mu, dimension=2, tolerance=1e-12)
     assert found.converged
-    assert found.method == "newton"
+    assert found.residual <= 1e-12
 
 
 def test_a_ball_on_a_floor_in_numbers() -> None:

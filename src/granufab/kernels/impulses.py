@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from granufab.kernels.access import address
 from granufab.kernels.cell import add_outer
-from granufab.kernels.options import part
+from granufab.kernels.options import kernel, part
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.vectors import (
     add,
@@ -25,7 +25,7 @@ from granufab.kernels.vectors import (
     tangential,
 )
 
-__all__ = ["apply_listed", "local_velocity"]
+__all__ = ["apply_impulses", "apply_listed", "local_velocity"]
 
 
 @part
@@ -74,3 +74,9 @@ def apply_listed(problem: Problem, state: State, listed, reach, rate, like):
     if not problem.coupled:
         for k in range(len(like)):
             rate[k, k] += dilation
+
+
+@kernel
+def apply_impulses(problem: Problem, state: State, listed, like):
+    """Add M⁻¹ H P of the listed contacts to motion and rate of the state."""
+    apply_listed(problem, state, listed, (0, len(listed)), state.rate, like)

@@ -1,12 +1,14 @@
 """The nonlinear solve of one step: sweeps with safeguarded momentum until the residual is met.
 
 Momentum: x_{k+1} = sweep(y_k), y_{k+1} = x_{k+1} + β_k (x_{k+1} − x_k) with β_k = min(k/(k+3),
-cap). When the step norm ‖x_{k+1} − y_k‖ grows by more than 1.02 the momentum restarts and 1 − cap
-grows by 1.3; after 15 sweeps without a restart 1 − cap shrinks by 1.3 again. Velocities are
-affine in the impulses, so both are extrapolated alike. The residual is taken only on an
-unextrapolated iterate, when the step norm promises that it is met, and at least every ``CHECK``
-sweeps. Where five checks bring no progress another cap is tried: on rare steps momentum circles
-around the solution while plain sweeps converge, on others it is the other way round.
+cap). When the step norm ‖x_{k+1} − y_k‖ is more than 1.1 times its smallest value since the last
+restart, the momentum restarts and 1 − cap grows by 1.3; after 15 sweeps without a restart 1 − cap
+shrinks by 1.3 again. Velocities are affine in the impulses, so both are extrapolated alike. The
+residual is taken only on an unextrapolated iterate, when the step norm promises that it is met, and
+at least every ``CHECK`` sweeps. Where five checks bring no progress another cap is tried: on rare
+steps momentum circles around the solution while plain sweeps converge, on others it is the other
+way round. The solve also ends where the step norm has not fallen by a tenth for a given number of
+sweeps: contacts that circle are then solved together (``granufab.simulate.mending``).
 
 Members of a team share the chunks of contacts; the first of them decides. What is computed does
 not depend on how many they are.
@@ -28,10 +30,11 @@ from granufab.kernels.team import given_up, meet
 __all__ = ["CHECK", "CONTROLS", "SUMS", "Work", "solve"]
 
 CHECK = 40
-GROWTH = 1.02
+GROWTH = 1.1
 CAUTION = 1.3
 RECOVERY = 15
 PROGRESS, PATIENCE = 0.9, 5
+FALL = 0.9
 BETA, DONE, SWEEPS, RESIDUAL, SHARE, VIOLATION, LOOK, RELATIVE = range(8)
 CONTROLS, SUMS = 8, 8
 
@@ -68,7 +71,8 @@ def solve(slots: Slots, bodies, law: Law, work: Work, like, size, settings, memb
         work: memory; ``work.cells[-1, 0]`` holds the free rates of the cell, in and out.
         like: width and dimension of the kernels (``access``).
         size: numbers of a batch.
-        settings: (tolerance, max_sweeps, momentum cap (0: plain), floor p d^{D−1} h).
+        settings: (tolerance, max_sweeps, momentum cap (0: plain), floor p d^{D−1} h, sweeps
+            without progress after which to stop).
         member, members: number of this thread, and how many solve together.
     Returns:
         sweeps, residual, largest single share, worst violation [m/s].
@@ -80,7 +84,7 @@ def solve(slots: Slots, bodies, law: Law, work: Work, like, size, settings, memb
     _remember(bodies, work, member, members)
     _judge(slots, bodies, law, work, like, size, settings, member, members)
     state = (settings[2], settings[2], 0, 0, np.inf)
-    watch = (0, np.inf, 0, 1.0)
+    watch = (0, np.inf, 0, 1.0, np.inf, 0.0)
     while control[DONE] == 0.0 and (members == 1 or not given_up(work.counters)):
         _extrapolate(bodies, work, control[BETA], member, members)
         meet(work.counters, members)
@@ -178,9 +182,9 @@ def _sweep_all(slots: Slots, bodies, law: Law, work: Work, like, size, member, m
 @part
 def _decide(work: Work, settings, state, watch):
     """After a sweep: the momentum of the next one, and whether the residual is to be taken."""
-    tolerance, max_sweeps, first_cap, floor = settings
-    cap, highest, age, calm, last = state
-    since, best, stale, ratio = watch
+    tolerance, max_sweeps, first_cap, floor, patience = settings
+    cap, highest, age, calm, least = state
+    since, best, stale, ratio, lowest, lowest_at = watch
     moved, length2 = 0.0, 0.0
     for k in range(len(work.sums)):
         moved += work.sums[k, 0]
@@ -190,29 +194,33 @@ def _decide(work: Work, settings, state, watch):
     control = work.control
     control[SWEEPS] += 1.0
     since += 1
-    spent = control[SWEEPS] >= max_sweeps
+    if step < FALL * lowest:
+        lowest, lowest_at = step, control[SWEEPS]
+    spent = control[SWEEPS] >= max_sweeps or control[SWEEPS] - lowest_at > patience
     control[LOOK] = 1.0 if relative * ratio < tolerance or since >= CHECK or spent else 0.0
     control[RELATIVE] = relative
     if first_cap > 0.0 and not spent:
-        if step > GROWTH * last:
-            age, calm = 0, 0
+        if step > GROWTH * least:
+            age, calm, least = 0, 0, step
             cap = max(0.0, 1.0 - CAUTION * (1.0 - cap))
         else:
             calm += 1
+            least = min(least, step)
             if calm == RECOVERY:
                 calm = 0
                 cap = min(highest, 1.0 - (1.0 - cap) / CAUTION)
-        last = step
         control[BETA] = min(age / (age + 3.0), cap)
         age += 1
-    return (cap, highest, age, calm, last), (since, best, stale, ratio)
+    return (cap, highest, age, calm, least), (
+        since, best, stale, ratio, lowest, lowest_at,
+    )  # fmt: skip
 
 
 @part
 def _consider(work: Work, settings, state, watch):
     """After the residual was taken: done, or another cap where nothing moves."""
-    cap, highest, age, calm, last = state
-    since, best, stale, ratio = watch
+    cap, highest, age, calm, least = state
+    since, best, stale, ratio, lowest, lowest_at = watch
     control = work.control
     found, due = control[RESIDUAL], since >= CHECK
     ratio = max(0.2, 0.9 * found / max(control[RELATIVE], 1e-300))
@@ -225,9 +233,11 @@ def _consider(work: Work, settings, state, watch):
         highest = next_cap(highest, settings[2])
         cap, calm, age = highest, 0, 0
         control[BETA] = 0.0
-    if control[SWEEPS] >= settings[1]:
+    if control[SWEEPS] >= settings[1] or control[SWEEPS] - lowest_at > settings[4]:
         control[DONE] = 1.0
-    return (cap, highest, age, calm, last), (0, best, stale, ratio)
+    return (cap, highest, age, calm, least), (
+        0, best, stale, ratio, lowest, lowest_at,
+    )  # fmt: skip
 
 
 @part

@@ -39,9 +39,12 @@ from granufab.kernels.step_arrays import (
     GEOMETRY,
     GOING,
     IMPOSED,
+    ITERATE,
     ITERATION,
     LATEST,
     MADE,
+    MEND,
+    MENDS,
     PATIENCE,
     PHASE,
     PIECES,
@@ -53,6 +56,7 @@ from granufab.kernels.step_arrays import (
     SEARCH,
     SHARE,
     SOLVE,
+    SPENT,
     STATUS,
     STOP,
     STRAIN_WALKED,
@@ -65,9 +69,11 @@ from granufab.kernels.step_arrays import (
     Notes,
     Pairs,
     StepLaw,
+    copy_matrix,
 )
 from granufab.kernels.sweep import Law
 from granufab.kernels.team import given_up, meet
+from granufab.kernels.tracing import whole
 
 __all__ = ["Step", "advance"]
 
@@ -169,10 +175,12 @@ def _solve(step: Step, law: StepLaw, settings, like, wide, member, members):
     control = notes.control
     again = True
     while again:
-        _assemble(step, law, like, member, members)
+        if control[PHASE] == SOLVE:
+            _assemble(step, law, like, member, members)
+        if control[STATUS] == GOING:
+            _iterate(step, settings, like, wide, member, members)
         if control[STATUS] != GOING:
             return
-        _iterate(step, settings, like, wide, member, members)
         _store(step, law, like, member, members)
         again = control[AGAIN] == 1.0
         if members > 1 and given_up(counters):
@@ -213,32 +221,41 @@ def _assemble(step: Step, law: StepLaw, like, member, members):
     set_velocities(
         step.bodies, step.box, problem, state, plan, notes, counters, like, member, members
     )
+    if member == 0:
+        notes.control[PHASE] = ITERATE
+        notes.control[SPENT], notes.control[MENDS] = 0.0, 0.0
 
 
 @part
 def _iterate(step: Step, settings, like, wide, member, members):
     """Sweep; the free rates go to and fro through the memory of the solve."""
     problem, state, work, notes = step.problem, step.state, step.work, step.notes
+    control, shared = notes.control, work.cells[-1, 0]
     if member == 0:
-        shared = work.cells[-1, 0]
-        for k in range(len(shared)):
-            for l in range(len(shared)):
-                shared[k, l] = state.rate[k, l]
+        copy_matrix(state.rate, shared)
         _tick(notes, ASSEMBLY)
+    meet(work.counters, members)
     shared_law = Law(
         problem.softness, problem.spin_factor, problem.coupled,
         problem.dilation_weight, problem.weight,
     )  # fmt: skip
     size = fields(like, problem.coupled) * WIDTH
+    tolerance, most, cap, floor, patience = settings
+    left = (tolerance, most - whole(control[SPENT]), cap, floor, patience)
     sweeps, residual, share, violation = solve(
-        step.slots, state.motion, shared_law, work, wide, size, settings, member, members
+        step.slots, state.motion, shared_law, work, wide, size, left, member, members
     )
+    meet(work.counters, members)
     if member == 0:
-        control = notes.control
+        control[SPENT] += sweeps
         control[SWEEPS] += sweeps
         control[UPDATES] += sweeps * control[COUNT]
         control[RESIDUAL], control[SHARE], control[VIOLATION] = residual, share, violation
+        if residual > tolerance and control[SPENT] < most:
+            copy_matrix(shared, state.rate)
+            control[STATUS] = MEND
         _tick(notes, ITERATION)
+    meet(work.counters, members)
 
 
 @part
@@ -271,6 +288,7 @@ def _store(step: Step, law: StepLaw, like, member, members):
         again = law.restitution == 0.0 and missed > 0.0 and control[RESOLVES] < MOST_RESOLVES
         control[AGAIN] = 1.0 if again else 0.0
         control[RESOLVES] += control[AGAIN]
+        control[PHASE] = SOLVE
         _tick(notes, ASSEMBLY)
     meet(counters, members)
 

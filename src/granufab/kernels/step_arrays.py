@@ -20,6 +20,7 @@ __all__ = [
     "Notes",
     "Pairs",
     "StepLaw",
+    "copy_matrix",
     "copy_numbers",
     "piece_of",
 ]
@@ -36,14 +37,15 @@ free rates before the solve and total ones before the step, and what is watched 
 
 PHASE, STATUS, MADE, COUNT, FARTHEST, STRAIN_WALKED, TIME = range(7)
 SWEEPS, RESOLVES, UPDATES, RESIDUAL, SHARE, VIOLATION, OVERLAP = range(7, 14)
-WALKED, WALK_GOAL, TOTAL, TOTAL_GOAL, AGAIN, BATCHES = range(14, 20)
-CONTROL = 20
+WALKED, WALK_GOAL, TOTAL, TOTAL_GOAL, AGAIN, BATCHES, SPENT, MENDS = range(14, 22)
+CONTROL = 22
 """Places in ``Notes.control``."""
 
-DRIFT, SURVEY, SOLVE = range(3)
+DRIFT, SURVEY, SOLVE, ITERATE = range(4)
 """Values of the phase: where a call goes on."""
-GOING, SEARCH, ROOM, STOP = range(4)
-"""Values of the status: go on; search the pairs; more room for batches; something to report."""
+GOING, SEARCH, ROOM, MEND, STOP = range(5)
+"""Values of the status: go on; search the pairs; more room for batches; contacts that circle are to
+be solved together; something to report."""
 
 STRAIN_COLUMN = 8
 """Columns of ``Notes.rows``: sweeps, residual, share, violation, overlap, contacts, resolves,
@@ -182,3 +184,11 @@ def copy_numbers(source, target, first, end):
     """Copy numbers ``first`` … ``end`` − 1 from one address to another."""
     for k in range(first, end):
         set_item(target, k, item(source, k))
+
+
+@part
+def copy_matrix(source, target):
+    """target ← source, for matrices (D, D)."""
+    for k in range(len(source)):
+        for l in range(len(source)):
+            target[k, l] = source[k, l]

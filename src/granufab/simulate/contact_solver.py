@@ -19,14 +19,15 @@ from granufab.kernels.neighbours import morton_order
 from granufab.kernels.pack import pack, solve_packed, unpack
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.schedule import Plan, schedule
-from granufab.kernels.slots import Slots, fields
+from granufab.kernels.slots import Slots, fields, places
 from granufab.kernels.solve import CONTROLS, SUMS, Work
 from granufab.kernels.sweep import Law
 from granufab.packing import Array, IntArray
 from granufab.simulate.bodies import aligned
+from granufab.simulate.mending import mend
 from granufab.simulate.team import Team, thread_count
 
-__all__ = ["ContactSolver", "Packed", "Solution", "wide_by_default"]
+__all__ = ["ContactSolver", "Packed", "Solution", "patience_of", "wide_by_default"]
 
 CHUNK_GRAINS, MOST_CHUNKS = 3000, 64
 """Grains for one chunk; from twice as many on the number of chunks is rounded up to ``TEAMS``."""
@@ -34,13 +35,31 @@ TEAMS = 4
 """Chunks are a multiple of this, so that two or four threads have equal shares."""
 
 
+PATIENCE = 150.0
+"""Sweeps without progress before a group is solved together."""
+
+
 class Solution(NamedTuple):
-    """How a solve ended: sweeps, residual, its largest single share, worst −ũ_n [m/s]."""
+    """How a solve ended.
+
+    Attributes:
+        sweeps: Gauss–Seidel sweeps.
+        residual: reached [-].
+        residual_contact: its largest single share [-].
+        violation: worst −ũ_n [m/s].
+        mends: groups of contacts that were solved together.
+    """
 
     sweeps: int
     residual: float
     residual_contact: float
     violation: float
+    mends: int = 0
+
+
+def patience_of(softness: float, cap: float) -> float:
+    """Sweeps without progress after which to stop; only compliant contacts can be mended."""
+    return PATIENCE if cap > 0 and softness > 0 else np.inf
 
 
 def wide_by_default() -> bool:
@@ -126,10 +145,44 @@ class ContactSolver:
             state: impulses, body records, free rates of the cell.
             settings: (tolerance, max_sweeps, momentum cap, floor), see ``kernels.solve``.
         """
+        tolerance, most, cap, floor = settings
+        patience = patience_of(problem.softness, cap)
         packed = self.pack(problem, state)
-        solution = self.iterate(packed, state, settings)
-        unpack(packed.slots, packed.plan, packed.size, state, self.like)
-        return solution
+        sweeps = mends = 0
+        while True:
+            found = self.iterate(packed, state, (tolerance, most - sweeps, cap, floor), patience)
+            sweeps += found.sweeps
+            if found.residual <= tolerance or sweeps >= most:
+                unpack(packed.slots, packed.plan, packed.size, state, self.like)
+                return found._replace(sweeps=sweeps, mends=mends)
+            mends += self.mend(problem, state, packed.slots, mends)
+
+    def mend(self, problem: Problem, state: State, slots: Slots, before: int) -> bool:
+        """Solve the contacts that circle together, in the packed contacts and in ``state``.
+
+        Args:
+            problem: contacts of the step, packed in ``slots``.
+            state: velocities that belong to the packed impulses; gets these, too.
+            slots: impulses of the last sweep and of the one before; both then hold the solution.
+            before: groups of this step that were solved already.
+        Returns:
+            Whether anything was done, see :func:`granufab.simulate.mending.mend`.
+        """
+        at, batches = places(self.like), int(slots.starts[-1])
+        size = fields(self.like, problem.coupled)
+        table = slots.values[: batches * size * WIDTH].reshape(batches, size, WIDTH)
+        slot = self.plan(0).order[: len(problem.length)]
+        batch, lane, tangents = slot // WIDTH, slot % WIDTH, state.impulse_t.shape[1]
+        now = [at.impulse_n, *(at.impulse_t + k for k in range(tangents))]
+        last = [at.before_n, *(at.before_t + k for k in range(tangents))]
+        impulse = np.stack([table[batch, field, lane] for field in now], axis=1)
+        change = impulse - np.stack([table[batch, field, lane] for field in last], axis=1)
+        state.impulse_n[:], state.impulse_t[:] = impulse[:, 0], impulse[:, 1:]
+        mended = mend(problem, state, np.linalg.norm(change, axis=1), before)
+        impulse = np.column_stack([state.impulse_n, state.impulse_t])
+        for k in range(tangents + 1):
+            table[batch, now[k], lane] = table[batch, last[k], lane] = impulse[:, k]
+        return mended
 
     def pack(self, problem: Problem, state: State) -> Packed:
         """The contacts in the order of the sweep; valid until the next call."""
@@ -144,9 +197,16 @@ class ContactSolver:
         return Packed(slots, law, plan, fields(self.like, problem.coupled) * WIDTH)
 
     def iterate(
-        self, packed: Packed, state: State, settings: tuple[float, int, float, float]
+        self,
+        packed: Packed,
+        state: State,
+        settings: tuple[float, int, float, float],
+        patience: float = np.inf,
     ) -> Solution:
-        """Sweep; impulses stay in the packed contacts, velocities and rates in ``state``."""
+        """Sweep; impulses stay in the packed contacts, velocities and rates in ``state``.
+
+        Ends also after ``patience`` sweeps without progress.
+        """
         work = self.work(state.motion)
         work.cells[-1, 0] = state.rate
         arguments = (
@@ -156,9 +216,9 @@ class ContactSolver:
             work,
             self.width,
             packed.size,
-            settings,
+            (*settings, patience),
         )
-        found = self.team.run(solve_packed, arguments, self.threads)
+        found = self.together(solve_packed, arguments)
         state.rate[:] = work.cells[-1, 0]
         return Solution(*found)
 

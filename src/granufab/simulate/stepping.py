@@ -27,6 +27,8 @@ from granufab.kernels.step_arrays import (
     IMPOSED,
     MADE,
     MATRIX,
+    MEND,
+    MENDS,
     PATIENCE,
     PHASE,
     RATE,
@@ -51,7 +53,7 @@ from granufab.packing import Array, Packing, require
 from granufab.simulate.bodies import body_records
 from granufab.simulate.candidates import Candidates
 from granufab.simulate.cell_motion import Tensor, shorten_cell
-from granufab.simulate.contact_solver import ContactSolver
+from granufab.simulate.contact_solver import ContactSolver, patience_of
 from granufab.simulate.loading import Loading
 from granufab.simulate.scales import Scales
 from granufab.simulate.settings import Material, Solver
@@ -300,6 +302,8 @@ class Simulation:
                 self.search()
             elif control[STATUS] == ROOM:
                 self.contact_solver.slots(int(control[BATCHES]), coupled=self.coupled)
+            elif control[STATUS] == MEND:
+                self._mend()
             elif (
                 made == steps
                 or control[STATUS] == STOP
@@ -313,6 +317,14 @@ class Simulation:
         if control[STATUS] == STOP:
             self._check(self.last_report)
         return reports
+
+    def _mend(self) -> None:
+        """Solve together the contacts round which the sweeps circle."""
+        began = time.perf_counter()
+        control, solver = self.memory.notes.control, self.contact_solver
+        slots = solver.slots(0, coupled=self.coupled)
+        control[MENDS] += solver.mend(self.problem, self.state, slots, int(control[MENDS]))
+        self._clock.seconds["sweeps"] += time.perf_counter() - began
 
     def _set_watch(self, watch: Watch | None) -> None:
         control = self.memory.notes.control
@@ -348,10 +360,11 @@ class Simulation:
             raise
         self._clock.add(memory.notes.clock, since)
 
-    def _solve_settings(self) -> tuple[float, int, float, float]:
+    def _solve_settings(self) -> tuple[float, int, float, float, float]:
         cap = MOMENTUM_CAP if self.solver.momentum else 0.0
         floor = self.scales.force * self.step_size
-        return (self.solver.tolerance, self.solver.max_sweeps, cap, floor)
+        patience = patience_of(self._problem_law().softness, cap)
+        return (self.solver.tolerance, self.solver.max_sweeps, cap, floor, patience)
 
     def _reports(self, rows: Array) -> StepReports:
         strain = rows[:, STRAIN_COLUMN : STRAIN_COLUMN + self.dimension**2]
