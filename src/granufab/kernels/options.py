@@ -117,7 +117,7 @@ intrinsic: Any = extending.intrinsic
 
 def steady(function: F) -> F:
     """As :func:`kernel`, for functions that allocate nothing: no references are counted."""
-    compiled: Any = njit(cache=True, nogil=True, no_cfunc_wrapper=True, _nrt=False, **ARITHMETIC)(
+    compiled: Any = njit
+    return compiled(cache=True, nogil=True, no_cfunc_wrapper=True, _nrt=False, **ARITHMETIC)(
         function
     )
-    return compiled

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from granufab.kernels.step_arrays import STRAIN_COLUMN
 from granufab.packing import Array, IntArray
 
 __all__ = ["StepReport", "StepReports"]
@@ -48,6 +51,41 @@ class StepReports:
     contact_updates: IntArray
     stress_error: Array
     strain: Array
+
+    @classmethod
+    def of_rows(
+        cls,
+        rows: Array,
+        shape: tuple[int, int],
+        *,
+        violation_unit: float,
+        diameter: float,
+        tolerance: float,
+        stress_error: Callable[[Array], Array],
+    ) -> Self:
+        """From the rows that the kernel wrote (``kernels.step_arrays``).
+
+        Args:
+            rows: one per step.
+            shape: (D, D).
+            violation_unit, diameter: of velocities [m/s] and lengths [m].
+            tolerance: residual of a converged step.
+            stress_error: of stresses, shape (step_count, D, D).
+        """
+        strain, stress = np.split(rows[:, STRAIN_COLUMN:], 2, axis=1)
+        return cls(
+            sweeps=rows[:, 0].astype(np.int64),
+            residual=rows[:, 1],
+            residual_contact=rows[:, 2],
+            violation=rows[:, 3] / violation_unit,
+            overlap=rows[:, 4] / diameter,
+            converged=rows[:, 1] <= tolerance,
+            contacts=rows[:, 5].astype(np.int64),
+            resolves=rows[:, 6].astype(np.int64),
+            contact_updates=rows[:, 7].astype(np.int64),
+            stress_error=stress_error(stress.reshape(-1, *shape)),
+            strain=strain.reshape(-1, *shape),
+        )
 
     def __len__(self) -> int:
         return len(self.sweeps)

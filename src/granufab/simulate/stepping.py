@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granufab.errors import InvalidPacking, InvalidSettings, NotConverged
+from granufab.errors import InvalidSettings
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.motion import kinetic_energy
 from granufab.kernels.problem import Problem, State
@@ -38,7 +38,6 @@ from granufab.kernels.step_arrays import (
     STATUS,
     STOP,
     STRAIN,
-    STRAIN_COLUMN,
     STRAIN_WALKED,
     STRESS,
     TIME,
@@ -53,19 +52,17 @@ from granufab.packing import Array, Packing, require
 from granufab.simulate.bodies import body_records
 from granufab.simulate.candidates import Candidates
 from granufab.simulate.cell_motion import Tensor, shorten_cell
-from granufab.simulate.contact_solver import ContactSolver, patience_of
+from granufab.simulate.contact_solver import ContactSolver
 from granufab.simulate.loading import Loading
 from granufab.simulate.scales import Scales
 from granufab.simulate.settings import Material, Solver
-from granufab.simulate.step_memory import ProblemLaw, StageClock, StepMemory
+from granufab.simulate.step_checks import check_step
+from granufab.simulate.step_law import problem_law, skin_of, solve_settings, step_law
+from granufab.simulate.step_memory import StageClock, StepMemory
 from granufab.simulate.step_report import StepReport, StepReports
 
 __all__ = ["Simulation", "Watch"]
 
-MOMENTUM_CAP = 0.9
-ACTIVE_MARGIN = 2e-3
-MISSED_TOLERANCE = 1e-6
-OVERLAP_LIMIT = 0.5
 SECONDS_OF_A_CALL = 0.2
 FEWEST_BATCHES = 16
 
@@ -139,7 +136,8 @@ class Simulation:
             members=self.contact_solver.team.most,
         )  # fmt: skip
         self.tensors = self.memory.tensors
-        self.matrix, self.origin, self.rate = cell.matrix, cell.origin, cell.rate
+        self.matrix, self.rate = cell.matrix, np.array(cell.rate)
+        self.origin = np.array(cell.origin)
         self.gravity = np.zeros(self.dimension) if gravity is None else np.asarray(gravity, float)
         self.candidates = Candidates(self.grain_count, self.dimension)
         self.step_size = 0.0
@@ -184,7 +182,7 @@ class Simulation:
     @property
     def problem(self) -> Problem:
         """Contact problem of the last step; valid until the next one."""
-        return self.memory.problem(self._problem_law(), self._contact_count)
+        return self.memory.problem(problem_law(self), self._contact_count)
 
     @property
     def state(self) -> State:
@@ -292,7 +290,7 @@ class Simulation:
         control = self.memory.notes.control
         self._set_watch(watch)
         began, rows, made = time.perf_counter(), [], 0
-        law = self._law()
+        law = step_law(self)
         while True:
             self._call(law, min(steps - made, ROWS if os.name == "posix" else 1))
             fresh = int(control[MADE])
@@ -310,12 +308,19 @@ class Simulation:
                 or time.perf_counter() - began > SECONDS_OF_A_CALL
             ):
                 break
-        reports = self._reports(rows[0] if len(rows) == 1 else np.concatenate(rows))
+        reports = StepReports.of_rows(
+            rows[0] if len(rows) == 1 else np.concatenate(rows),
+            (self.dimension, self.dimension),
+            violation_unit=self.scales.diameter / self.step_size,
+            diameter=self.scales.diameter,
+            tolerance=self.solver.tolerance,
+            stress_error=self._stress_errors,
+        )
         self.time = float(control[TIME])
         self.contact_updates += int(reports.contact_updates.sum())
         self.last_report = reports.last
         if control[STATUS] == STOP:
-            self._check(self.last_report)
+            check_step(self, self.last_report)
         return reports
 
     def _mend(self) -> None:
@@ -330,11 +335,10 @@ class Simulation:
         control = self.memory.notes.control
         control[TIME], control[WALKED], control[TOTAL] = self.time, 0.0, 0.0
         control[WALK_GOAL], control[TOTAL_GOAL] = np.inf, np.inf
+        self.tensors[WATCH] = 0.0
         if watch is not None:
             self.tensors[WATCH] = watch.weight
             control[WALK_GOAL], control[TOTAL_GOAL] = watch.walked, watch.total
-        else:
-            self.tensors[WATCH] = 0.0
 
     def _call(self, law: StepLaw, steps: int) -> None:
         """One call of the kernel."""
@@ -345,78 +349,20 @@ class Simulation:
             bodies=memory.bodies(),
             box=memory.box(),
             pairs=self.candidates.arrays(),
-            problem=memory.problem(self._problem_law()),
+            problem=memory.problem(problem_law(self)),
             state=memory.state(),
             plan=solver.plan(self.candidates.count),
             slots=solver.slots(0, coupled=self.coupled),
             work=solver.work(self.motion),
             notes=memory.notes,
         )
-        arguments = (step, law, self._solve_settings(), self.like, solver.width, steps)
+        arguments = (step, law, solve_settings(self), self.like, solver.width, steps)
         try:
             solver.together(advance, arguments)
         except BaseException:
             memory.notes.control[PHASE] = DRIFT
             raise
         self._clock.add(memory.notes.clock, since)
-
-    def _solve_settings(self) -> tuple[float, int, float, float, float]:
-        cap = MOMENTUM_CAP if self.solver.momentum else 0.0
-        floor = self.scales.force * self.step_size
-        patience = patience_of(self._problem_law().softness, cap)
-        return (self.solver.tolerance, self.solver.max_sweeps, cap, floor, patience)
-
-    def _reports(self, rows: Array) -> StepReports:
-        strain = rows[:, STRAIN_COLUMN : STRAIN_COLUMN + self.dimension**2]
-        stress = rows[:, STRAIN_COLUMN + self.dimension**2 :]
-        shape = (-1, self.dimension, self.dimension)
-        return StepReports(
-            sweeps=rows[:, 0].astype(np.int64),
-            residual=rows[:, 1],
-            residual_contact=rows[:, 2],
-            violation=rows[:, 3] * (self.step_size / self.scales.diameter),
-            overlap=rows[:, 4] / self.scales.diameter,
-            converged=rows[:, 1] <= self.solver.tolerance,
-            contacts=rows[:, 5].astype(np.int64),
-            resolves=rows[:, 6].astype(np.int64),
-            contact_updates=rows[:, 7].astype(np.int64),
-            stress_error=self._stress_errors(stress.reshape(shape)),
-            strain=strain.reshape(shape),
-        )
-
-    def _law(self) -> StepLaw:
-        diameter = self.scales.diameter
-        return StepLaw(
-            step=self.step_size,
-            overlap_correction=self.solver.overlap_correction,
-            restitution=float(self.material.restitution),
-            damping=float(self.damping),
-            dilation=bool(self.loading.dilation),
-            cell_inertia=self.cell_inertia,
-            skin=self._skin,
-            margin=ACTIVE_MARGIN * diameter,
-            touching=1e-10 * diameter,
-            missed=MISSED_TOLERANCE * diameter,
-            reach=2 * float(self.radius.max()) + self._skin,
-            rate_cap=np.inf if self.rate_cap is None else float(self.rate_cap),
-            overlap_limit=OVERLAP_LIMIT * diameter,
-            strict=bool(self.solver.strict),
-        )
-
-    def _problem_law(self) -> ProblemLaw:
-        stiffness = self.solver.stiffness * self.scales.force / self.scales.diameter
-        soft = np.isfinite(stiffness) and self.material.restitution == 0
-        return ProblemLaw(
-            softness=1 / (stiffness * self.step_size**2) if soft else 0.0,
-            spin_factor=self.spin_factor,
-            coupled=self.coupled,
-            dilation_weight=self.dilation_weight,
-            weight=self.weight,
-        )
-
-    @property
-    def _skin(self) -> float:
-        return self.solver.skin * self.scales.diameter
 
     def search(self) -> None:
         """Find the candidate pairs afresh; gaps are measured separately."""
@@ -426,7 +372,7 @@ class Simulation:
         friction = (self.material.friction, self.material.wall_friction)
         solver = self.contact_solver
         self.candidates.search(
-            self.position, self.radius, (matrix, origin, self.periodic), self._skin, friction,
+            self.position, self.radius, (matrix, origin, self.periodic), skin_of(self), friction,
             solver.together,
         )  # fmt: skip
         solver.arrange(self.position, matrix, origin)
@@ -442,31 +388,12 @@ class Simulation:
 
     def measure_gaps(self) -> None:
         """Normals, lengths and gaps of the candidates; impulses turn with the normals."""
-        self._call(self._law(), 0)
+        self._call(step_law(self), 0)
 
     @property
     def volume(self) -> float:
         """Cell volume now [m^D]."""
         return float(np.linalg.det(self.matrix))
-
-    def _check(self, report: StepReport) -> None:
-        if not np.isfinite(self.motion).all() or not np.isfinite(self.rate).all():
-            bad = np.flatnonzero(~np.isfinite(self.motion).all(axis=1))[:3]
-            raise InvalidPacking(
-                f"the velocity of grains {bad.tolist()} is not finite after a step"
-            )
-        if report.overlap > OVERLAP_LIMIT:
-            worst = int(np.argmin(self.candidates.gap))
-            i, j = self.candidates.pairs[worst]
-            raise InvalidPacking(
-                f"grains {i} and {j} overlap by {report.overlap:.2g} diameters, limit "
-                f"{OVERLAP_LIMIT}; take a smaller time_step"
-            )
-        if not report.converged and self.solver.strict:
-            raise NotConverged(
-                f"a step ended at residual {report.residual:.2e} after {report.sweeps} sweeps, "
-                f"tolerance {self.solver.tolerance:.1e}; raise solver.max_sweeps or lower stiffness"
-            )
 
     def kinetic_ratio(self) -> float:
         """Kinetic energy of the fluctuations / (p V) [-]."""
