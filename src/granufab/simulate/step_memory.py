@@ -12,6 +12,7 @@ from granufab.kernels.step_arrays import (
     ASSEMBLY,
     CLOCKS,
     CONTROL,
+    COUNT,
     GEOMETRY,
     ITERATION,
     PIECES,
@@ -82,6 +83,11 @@ class StepMemory:
         self._normal = np.zeros((room, dimension))
         self._lines = [np.zeros(room) for _ in range(4)]  # length, offset_n, µ, impulse_n
         self._planes = [np.zeros((room, tangents)) for _ in range(2)]  # offset_t, impulse_t
+
+    @property
+    def contact_count(self) -> int:
+        """Contacts of the last solve."""
+        return int(self.notes.control[COUNT])
 
     def bodies(self) -> Bodies:
         """Grains and body records, for kernels."""

@@ -19,7 +19,6 @@ from granufab.kernels.problem import Problem, State
 from granufab.kernels.step import Step, advance
 from granufab.kernels.step_arrays import (
     BATCHES,
-    COUNT,
     DRIFT,
     EXTERNAL,
     FARTHEST,
@@ -136,8 +135,7 @@ class Simulation:
             members=self.contact_solver.team.most,
         )  # fmt: skip
         self.tensors = self.memory.tensors
-        self.matrix, self.rate = cell.matrix, np.array(cell.rate)
-        self.origin = np.array(cell.origin)
+        self.matrix, self.rate, self.origin = map(np.array, (cell.matrix, cell.rate, cell.origin))
         self.gravity = np.zeros(self.dimension) if gravity is None else np.asarray(gravity, float)
         self.candidates = Candidates(self.grain_count, self.dimension)
         self.step_size = 0.0
@@ -182,16 +180,12 @@ class Simulation:
     @property
     def problem(self) -> Problem:
         """Contact problem of the last step; valid until the next one."""
-        return self.memory.problem(problem_law(self), self._contact_count)
+        return self.memory.problem(problem_law(self), self.memory.contact_count)
 
     @property
     def state(self) -> State:
         """Solution of the last step; valid until the next one."""
-        return self.memory.state(self._contact_count)
-
-    @property
-    def _contact_count(self) -> int:
-        return int(self.memory.notes.control[COUNT])
+        return self.memory.state(self.memory.contact_count)
 
     def set_loading(self, loading: Loading, *, step: float | None = None) -> None:
         """Change what drives the cell; impulses are rescaled to the new time step.
