@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
-import xarray as xr
 
 from granufab.packing import Array, Packing
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = [
     "SERIES_UNITS",
@@ -193,6 +195,9 @@ def series_dataset(
         rows: mappings with the keys of :data:`SERIES_UNITS` (others are kept without units).
         attributes: criterion, z_definition and other provenance.
     """
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     names = list(rows[0]) if rows else list(SERIES_UNITS)
     data = {}
     for name in names:

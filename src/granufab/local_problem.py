@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import sparse
+import scipy  # its parts load where they are used
 
 from granufab.errors import InvalidProblem
 from granufab.packing import Array
@@ -37,7 +37,7 @@ class LocalProblem:
         title, description: in words, for files.
     """
 
-    W: sparse.csr_array
+    W: scipy.sparse.csr_array
     q: Array
     mu: Array
     dimension: int
@@ -131,10 +131,10 @@ def _frozen(value: Any, name: str) -> Array:
     return array
 
 
-def _matrix(value: Any, size: int) -> sparse.csr_array:
+def _matrix(value: Any, size: int) -> scipy.sparse.csr_array:
     """W as canonical read-only CSR."""
     try:
-        W: Any = sparse.csr_array(value, dtype=np.float64, copy=True)
+        W: Any = scipy.sparse.csr_array(value, dtype=np.float64, copy=True)
     except (TypeError, ValueError):
         raise InvalidProblem("W is not a matrix of numbers, sparse or dense") from None
     if W.shape != (size, size):

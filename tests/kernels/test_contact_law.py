@@ -8,13 +8,31 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from numba import njit
 
-from granufab.kernels.contact_law import cone_defect, separate_law, slide_or_stick
+from granufab.kernels import contact_law
 
 numbers = st.floats(-5, 5, allow_nan=False).map(lambda x: 0.0 if abs(x) < 1e-6 else x)
 positive = st.floats(0.05, 5)
 frictions = st.one_of(st.just(0.0), st.floats(0.0, 1.5))
 impulses = st.floats(0, 5).map(lambda x: 0.0 if x < 1e-6 else x)
+
+
+@njit
+def separate_law(*arguments):
+    return contact_law.separate_law(*arguments)
+
+
+@njit
+def slide_or_stick(*arguments):
+    return contact_law.slide_or_stick(*arguments)
+
+
+@njit
+def cone_defect(*arguments):
+    return contact_law.cone_defect(*arguments)
+
+
 TOLERANCE = 1e-9
 EXAMPLES = settings(deadline=None, derandomize=True, max_examples=300)  # the first compiles
 

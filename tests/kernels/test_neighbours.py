@@ -43,18 +43,10 @@ def _all_pairs(position, radius, matrix, periodic, skin, span=3):
 
 
 def _found_pairs(position, radius, matrix, periodic, skin, origin):
-    pairs, images, count = find_pairs(
-        position,
-        radius,
-        matrix,
-        np.linalg.inv(matrix),
-        origin,
-        np.array(periodic),
-        skin,
-        5000,
-    )
-    assert count <= 5000
-    rows = np.column_stack([pairs[:count], images[:count]])
+    cell = (matrix, origin, np.array(periodic))
+    pairs, images = find_pairs(position, radius, cell, skin)
+    count = len(pairs)
+    rows = np.column_stack([pairs, images])
     unique = {tuple(int(x) for x in row) for row in rows}
     assert len(unique) == count, "a pair is listed twice"
     return unique
@@ -106,16 +98,22 @@ def test_every_pair_is_found_in_random_cells(seed, tilt, height, count):
     assert found == _all_pairs(position, radius, matrix, (True, True), SKIN)
 
 
-def test_too_little_room_is_told_and_filled():
-    position = np.zeros((10, 2)) + 0.01 * np.arange(10)[:, None]
-    radius, matrix = np.full(10, 0.5), np.eye(2) * 20.0
-    periodic = np.array([True, True])
-    pairs, _, count = find_pairs(
-        position, radius, matrix, matrix / 400, np.zeros(2), periodic, SKIN, 7
-    )
-    assert count == 45
-    assert len(pairs) == 7
-    assert (pairs[:, 0] < pairs[:, 1]).all()
+@pytest.mark.parametrize("members", [2, 3, 40])
+def test_members_of_a_team_find_the_same_pairs_in_the_same_order(members):
+    generator = np.random.default_rng(5)
+    position, radius = generator.uniform(0, 9, (200, 2)), np.full(200, 0.4)
+    cell = (np.array([[9.0, 2.0], [0.0, 9.0]]), np.zeros(2), np.array([True, True]))
+
+    def run(kernel, arguments):
+        for member in reversed(range(members)):
+            kernel(*arguments, member, members)
+
+    alone = find_pairs(position, radius, cell, SKIN)
+    shared = find_pairs(position, radius, cell, SKIN, run=run, room=10_000)
+    assert len(alone[0]) > 200
+    assert (np.diff(alone[0][:, 0]) >= 0).all()
+    for one, other in zip(alone, shared, strict=True):
+        assert np.array_equal(one, other)
 
 
 def test_walls_within_reach():

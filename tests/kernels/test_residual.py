@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from granufab.kernels.impulses import apply_impulses
+from granufab.kernels.impulses import apply_listed
 from granufab.kernels.problem import Problem, State
 from granufab.simulate.contact_solver import ContactSolver
 
@@ -223,7 +223,8 @@ def test_sweeps_keep_velocities_and_impulses_together(dimension, coupled, softne
     for _ in range(3):
         sweep(problem, state, wide=wide, chunks=chunks)
     afresh = State(free.motion, free.rate, state.impulse_n, state.impulse_t)
-    apply_impulses(problem, afresh, (0.0,) * dimension)
+    everything = np.arange(CONTACTS)
+    apply_listed(problem, afresh, everything, (0, CONTACTS), afresh.rate, (0.0,) * dimension)
     assert afresh.motion == pytest.approx(state.motion, abs=1e-13)
     assert afresh.rate == pytest.approx(state.rate, abs=1e-14)
     assert np.abs(state.rate).max() > 1e-3

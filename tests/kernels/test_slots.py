@@ -8,12 +8,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from granufab.kernels.lanes import WIDTH
-from granufab.kernels.slots import schedule
+from granufab.kernels.schedule import Plan, schedule
 
 
 def _check(first, second, grains, chunk, chunk_count):
-    order = np.empty(len(first), np.int64)
-    starts = schedule(first, second, grains, chunk, chunk_count, order)
+    plan = Plan.of(chunk[:grains], chunk_count, len(first))
+    assert schedule(plan, first, second) == plan.starts[-1]
+    starts, order = plan.starts, np.empty(len(first), np.int64)
+    for k in range(chunk_count + 1):
+        own = plan.listed[plan.heads[k] : plan.heads[k + 1]]
+        assert (np.diff(own) > 0).all()
+        order[own] = plan.order[own] + starts[k] * WIDTH
     assert len(set(order.tolist())) == len(first)
     assert starts[0] == 0
     assert (np.diff(starts) >= 0).all()

@@ -46,11 +46,11 @@ def test_plain_and_compiled_kernels_agree(name, plain, compiled):
 def test_many_contacts_are_packed_without_compilation() -> None:
     code = (
         "import numpy as np\n"
-        "from granufab.kernels.slots import schedule\n"
+        "from granufab.kernels.schedule import Plan, schedule\n"
         "first = np.arange(400, dtype=np.int32)\n"
-        "order = np.empty(400, np.int64)\n"
-        "starts = schedule(first, first + 1, 401, np.zeros(401, np.int64), 1, order)\n"
-        "assert len(set(order.tolist())) == 400 and order.max() < 8 * starts[-1]\n"
+        "plan = Plan.of(np.zeros(401, np.int64), 1, 400)\n"
+        "batches, order = schedule(plan, first, first + 1), plan.order[:400]\n"
+        "assert len(set(order.tolist())) == 400 and order.max() < 8 * batches\n"
     )
     package = str(Path(granufab.__file__).resolve().parents[1])
     done = subprocess.run(

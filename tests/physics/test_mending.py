@@ -58,7 +58,8 @@ def test_a_group_that_was_pushed_away_finds_back(samples, loading: Loading) -> N
     push_n, push_t = np.zeros_like(solution.impulse_n), np.zeros_like(solution.impulse_t)
     push_n[pushed] = 1e-3 * solution.impulse_n[pushed]
     state.impulse_n[:] += push_n
-    apply_impulses(problem, State(state.motion, state.rate, push_n, push_t), simulation.like)
+    turn = State(state.motion, state.rate, push_n, push_t)
+    apply_impulses(problem, turn, np.arange(len(push_n)), simulation.like)
     state.rate[:] = solution.rate  # the cell is held: it stays as the solution has it
     assert mend(problem, state, np.abs(push_n))
     assert np.abs(state.impulse_n - solution.impulse_n).max() < 1e-6 * size
@@ -74,7 +75,7 @@ def test_velocities_follow_the_impulses(samples) -> None:
     found_n, found_t = state.impulse_n - before.impulse_n, state.impulse_t - before.impulse_t
     assert np.abs(found_n).max() > 0
     moved = State(before.motion, before.rate, found_n, found_t)
-    apply_impulses(problem, moved, simulation.like)
+    apply_impulses(problem, moved, np.arange(len(problem.length)), simulation.like)
     assert state.motion == pytest.approx(moved.motion, abs=1e-12)
     assert state.rate == pytest.approx(moved.rate, abs=1e-12)
 

@@ -9,7 +9,8 @@ import pytest
 from physics_cases import RIGID, grains
 
 from granufab.fabric import fourth_order_tensor, measure, select_contacts
-from granufab.kernels.motion import measure_gaps, relative_velocity
+from granufab.kernels.geometry import measure_gaps
+from granufab.kernels.motion import relative_velocity
 from granufab.kernels.neighbours import find_pairs
 from granufab.kernels.problem import Problem
 from granufab.packing import Cell, Packing
@@ -32,17 +33,9 @@ def _touching(position):
     count, dimension = position.shape
     matrix = np.eye(dimension) * 100.0
     radius = np.full(count, 0.5)
-    pairs, images, found = find_pairs(
-        position,
-        radius,
-        matrix,
-        np.linalg.inv(matrix),
-        np.full(dimension, -50.0),
-        np.ones(dimension, dtype=bool),
-        1e-9,
-        20 * count,
-    )
-    pairs, images = pairs[:found], images[:found]
+    cell = (matrix, np.full(dimension, -50.0), np.ones(dimension, dtype=bool))
+    pairs, images = find_pairs(position, radius, cell, 1e-9)
+    found = len(pairs)
     normal, length, gap = np.empty((found, dimension)), np.empty(found), np.empty(found)
     measure_gaps(
         position,
@@ -51,10 +44,11 @@ def _touching(position):
         np.full(dimension, -50.0),
         pairs,
         images,
-        count,
         normal,
         length,
         gap,
+        (0, found),
+        (0.0,) * dimension,
     )
     assert np.abs(gap).max() < 1e-14
     return Problem(

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 import granufab.simulate.contact_solver as contact_solver
+import granufab.simulate.stepping as stepping
 from granufab.errors import InvalidSettings
 from granufab.packing import Packing
 from granufab.simulate import Biaxial, ConstantMean, Simulation, Solver, compress, random_sample
+from granufab.simulate.team import thread_count
 
 
 @pytest.fixture(scope="module", params=[2, 3])
@@ -59,18 +61,18 @@ def test_a_failing_member_ends_the_others(packing, monkeypatch):
     """And the next step starts afresh, with the same result."""
     simulation = _state(packing, monkeypatch, 2, ConstantMean)
     other = _state(packing, monkeypatch, 2, ConstantMean)
-    solve = contact_solver.solve
+    advance = stepping.advance
 
     def fail(*arguments):
         if arguments[-2] == 0:
             raise KeyboardInterrupt
-        return solve(*arguments)
+        return advance(*arguments)
 
-    monkeypatch.setattr(contact_solver, "solve", fail)
+    monkeypatch.setattr(stepping, "advance", fail)
     motion, position, matrix = other.motion.copy(), other.position.copy(), other.matrix.copy()
     with pytest.raises(KeyboardInterrupt):
         other.step()
-    monkeypatch.setattr(contact_solver, "solve", solve)
+    monkeypatch.setattr(stepping, "advance", advance)
     other.motion[:], other.position[:], other.matrix = motion, position, matrix
     assert other.step().converged
     assert simulation.step().converged
@@ -100,4 +102,4 @@ def test_a_fork_steps_on_with_threads_of_its_own(packing, monkeypatch):
 def test_a_wrong_number_of_threads_is_refused(monkeypatch, given):
     monkeypatch.setenv("GRANUFAB_THREADS", given)
     with pytest.raises(InvalidSettings, match="GRANUFAB_THREADS is"):
-        contact_solver.thread_count()
+        thread_count()

@@ -13,13 +13,14 @@ import numpy as np
 
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.options import kernel
+from granufab.kernels.pack import unpack
 from granufab.kernels.problem import Problem, State
-from granufab.kernels.slots import places, unpack
+from granufab.kernels.slots import places
 from granufab.kernels.sweep import lag_of, sweep
 from granufab.packing import Array, Packing
 from granufab.simulate import Loading, Material, Simulation, Solver
 from granufab.simulate.bodies import aligned
-from granufab.simulate.contact_solver import ContactSolver, Solution, wide_by_default
+from granufab.simulate.contact_solver import ContactSolver, wide_by_default
 
 __all__ = [
     "Case",
@@ -253,20 +254,8 @@ def sweep_seconds(
     else:
         solver.iterate(packed, state, (-1.0, sweeps, 0.0, 1.0))
     seconds = time.perf_counter() - began
-    unpack(packed.slots, packed.size, packed.order, state.impulse_n, state.impulse_t, solver.like)
+    unpack(packed.slots, packed.plan, packed.size, state, solver.like)
     return seconds
-
-
-class _Timed(Simulation):
-    """A simulation that also knows the time spent in the iterations alone."""
-
-    sweeping = 0.0
-
-    def _iterate(self, problem: Problem) -> Solution:
-        began = time.perf_counter()
-        found = super()._iterate(problem)
-        self.sweeping += time.perf_counter() - began
-        return found
 
 
 class Marching:
@@ -293,27 +282,32 @@ class Marching:
     ) -> None:
         solver = Solver(tolerance=tolerance, momentum=accelerated, max_sweeps=cap)
         self.stiffness = solver.stiffness
-        self._simulation = _Timed(
+        self._simulation = Simulation(
             packing, loading, material=Material(friction=friction), solver=solver
         )
 
     def step(self) -> StepCost:
         """One step."""
-        before = self._simulation.seconds["solve"]
+        before = self._solving()
         began = time.perf_counter()
         report = self._simulation.step()
         return StepCost(
             sweeps=report.sweeps,
-            seconds=self._simulation.seconds["solve"] - before,
+            seconds=self._solving() - before,
             step_seconds=time.perf_counter() - began,
             residual=report.residual,
             reached=report.converged,
             contacts=report.contacts,
         )
 
+    def _solving(self) -> float:
+        return self._simulation.seconds["assembly"] + self._simulation.seconds["sweeps"]
+
     def seconds_by_stage(self) -> dict[str, float]:
-        """Seconds so far: search, geometry, iterations of the solver, rest of the solve, rest."""
+        """Seconds so far: iterations of the solver, rest of the solve, search, geometry, rest."""
         seconds = dict(self._simulation.seconds)
-        solve = seconds.pop("solve")
-        sweeping = self._simulation.sweeping
-        return {"sweeps": sweeping, "rest of the solve": solve - sweeping, **seconds}
+        return {
+            "sweeps": seconds.pop("sweeps"),
+            "rest of the solve": seconds.pop("assembly"),
+            **seconds,
+        }

@@ -12,10 +12,9 @@ towards growing θ; it enters a bin through its lower edge and leaves through it
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from granufab.errors import InvalidPacking
 from granufab.fabric.affine import affine_current, mean_gradient
@@ -32,6 +31,9 @@ from granufab.fabric.direction_bins import DirectionBins
 from granufab.fabric.lattice import lattice_changes
 from granufab.history import Frame, packing_of
 from granufab.packing import Array, Packing
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["balance", "balance_attributes", "balance_coordinates", "balance_item", "count_balance"]
 
@@ -112,6 +114,9 @@ def balance(
         MissingData: a state lacks what the criterion needs.
         InvalidSettings: an unknown criterion or definition, bad bins, direction or keep.
     """
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     rule = ContactRule(
         criterion=parse_criterion(criterion),
         keep=keep,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from granufab.errors import MissingData
 from granufab.fabric.balance_run import (
@@ -18,6 +18,9 @@ from granufab.fabric.coordination import ZDefinition
 from granufab.fabric.criterion import Criterion
 from granufab.history import Run
 from granufab.packing import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["average_balance", "rates_by_sampling"]
 
@@ -47,6 +50,9 @@ def average_balance(data: xr.Dataset, *, window: tuple[float, float] | None = No
     Raises:
         MissingData: no interval with strain lies in the window.
     """
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     part, window = _inside(data, window)
     strain = part["strain"].to_numpy()
     size, grains = float(data.attrs["bin_measure"]), int(data.attrs["grain_count"])
@@ -192,6 +198,9 @@ def rates_by_sampling(
         MissingData: no multiple fits.
         InvalidSettings: as for :func:`~granufab.fabric.balance_run`.
     """
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     followed = follow_run(run, criterion=criterion, z_definition=z_definition, keep=keep)
     rows: list[dict[str, float]] = []
     attributes: dict = {}

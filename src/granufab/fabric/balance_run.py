@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.balance import (
@@ -29,6 +29,9 @@ from granufab.fabric.lattice import lattice_change
 from granufab.fabric.run_definitions import recorded_reach, run_definitions
 from granufab.history import Run
 from granufab.packing import Array, IntArray, Packing
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["FollowedRun", "balance_intervals", "balance_run", "count_error", "follow_run"]
 
@@ -201,6 +204,9 @@ def balance_intervals(
         MissingData: no stage has ``every`` + 1 frames.
         InvalidSettings: ``every`` is below 1, or bad bins or direction.
     """
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     first = followed.contacts[0]
     chosen = DirectionBins.of(
         followed.direction if direction is None else direction, bins, first.normal.shape[1]

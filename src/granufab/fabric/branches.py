@@ -6,10 +6,9 @@ Source: [Radjai2012, §2]: P_ℓ, <ℓ>(n) and P_ℓn.
 from __future__ import annotations
 
 import math
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import xarray as xr
 
 from granufab.errors import InvalidSettings
 from granufab.fabric.coordination import ZDefinition
@@ -30,6 +29,9 @@ from granufab.fabric.ensemble import (
 )
 from granufab.fabric.variables import describe
 from granufab.packing import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["branches"]
 
@@ -81,6 +83,9 @@ def branches(
         MissingData: no contacts, or they point in too few directions.
         InvalidSettings: too few bins, an unknown orientation, criterion or definition.
     """
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     if orientation not in ("normal", "branch"):
         raise InvalidSettings(f"orientation {orientation!r} is unknown; allowed: normal, branch")
     if length_bins < 1:

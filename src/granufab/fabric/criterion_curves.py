@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from granufab.errors import InvalidSettings, MissingData
@@ -23,6 +22,9 @@ from granufab.fabric.tensors import anisotropy, fabric_tensor, signed_anisotropy
 from granufab.fabric.variables import describe
 from granufab.history import Frame, Run
 from granufab.packing import Array, Packing
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["criterion_curves", "criterion_sweep"]
 
@@ -101,6 +103,9 @@ def criterion_curves(
         InvalidSettings: a threshold out of range, an unknown definition, or a frame that the run
             does not have.
     """
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     if isinstance(states, Run):
         _, z_definition, minimum = run_definitions(states, None, z_definition, minimum)
     definition, fewest = check_definition(z_definition or "z_backbone"), minimum or 2

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import eval_legendre
+import scipy  # its parts load where they are used
 
 from granufab.errors import InvalidSettings, MissingData
 from granufab.packing import Array, IntArray
@@ -116,7 +116,9 @@ def even_columns(offset: Array, dimension: int) -> Array:
         if dimension == 2:
             columns += [np.cos(mode * offset), np.sin(mode * offset)]
         else:
-            columns.append((2.0 if mode == 2 else 1.0) * eval_legendre(mode, np.cos(offset)))
+            columns.append(
+                (2.0 if mode == 2 else 1.0) * scipy.special.eval_legendre(mode, np.cos(offset))
+            )
     return np.column_stack(columns)
 
 
@@ -138,7 +140,10 @@ def odd_columns(offset: Array, dimension: int) -> Array:
     columns = [np.sin(2 * offset)]
     for mode in _MODES[1:]:
         # (1 − c²) P_l' = l (P_{l−1} − c P_l).
-        slope = mode * (eval_legendre(mode - 1, cosine) - cosine * eval_legendre(mode, cosine))
+        slope = mode * (
+            scipy.special.eval_legendre(mode - 1, cosine)
+            - cosine * scipy.special.eval_legendre(mode, cosine)
+        )
         columns.append(np.divide(slope, sine, out=np.zeros_like(sine), where=sine > 1e-12))
     return np.column_stack(columns)
 

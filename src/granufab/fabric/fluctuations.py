@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.displacements import Range, States, Track, follow
 from granufab.fabric.relative_velocity import block_count, spatial_blocks
 from granufab.packing import Array, IntArray
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["fluctuations"]
 
@@ -218,6 +220,8 @@ def _dataset(
     windows: list[int],
     edges: Array,
 ) -> xr.Dataset:
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     data: dict[str, Any] = {}
     for name, (text, unit, dims) in _TEXT.items():
         data[name] = (dims, best[name], {"units": unit, "long_name": text})

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
+import scipy  # its parts load where they are used
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.coordination import ZDefinition
@@ -29,6 +29,9 @@ from granufab.fabric.ensemble import (
 from granufab.fabric.tensors import axial_anisotropy
 from granufab.fabric.variables import describe
 from granufab.packing import Array, require
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["force_statistics"]
 
@@ -83,6 +86,9 @@ def force_statistics(
         MissingData: no forces or no contacts.
         InvalidSettings: friction, tolerance, weak_from, bins or smallest out of range.
     """
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     _check(friction, tolerance, weak_from, bins, smallest)
     sample = pool_contacts(
         states, criterion=criterion, z_definition=z_definition, minimum=minimum, axis=axis
@@ -248,7 +254,7 @@ def _power_exponent(mean: float, depth: float) -> float:
     low, high = -500.0 / depth, 500.0 / depth
     if excess(low) * excess(high) > 0:
         return math.nan
-    return float(brentq(excess, low, high)) - 1.0
+    return float(scipy.optimize.brentq(excess, low, high)) - 1.0
 
 
 def _mobilised(force: Array, normal_force: Array, normal: Array, friction: float) -> Array:

@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
-from scipy.special import lpmv
+import scipy  # its parts load where they are used
 
 from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.variables import describe
 from granufab.packing import Array, Contacts, IntArray
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["real_harmonics", "sphere_density", "sphere_orientation"]
 
@@ -40,7 +43,7 @@ def real_harmonics(direction: Array, order: int) -> Array:
     for m in range(order + 1):
         ratio = math.factorial(order - m) / math.factorial(order + m)
         scale = math.sqrt((2 * order + 1) * ratio * (1 if m == 0 else 2))
-        value = scale * lpmv(m, order, cosine)
+        value = scale * scipy.special.lpmv(m, order, cosine)
         columns[order - m] = value * np.sin(m * azimuth)
         columns[order + m] = value * np.cos(m * azimuth)
     return np.stack(columns, axis=-1)
@@ -82,6 +85,9 @@ def sphere_orientation(
         MissingData: fewer than 2 contacts, or contacts in 2D.
         InvalidSettings: an order that is odd or out of 2..20, or no ring.
     """
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     _check(contacts, orders, rings)
     values = {order: real_harmonics(contacts.normal, order) for order in sorted(set(orders))}
     data = _terms(values) | _powers(values) | _cells(contacts.normal, z, rings)

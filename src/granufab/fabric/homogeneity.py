@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from granufab.errors import InvalidPacking, InvalidSettings, MissingData
 from granufab.fabric.neighbours import cell_fractions, wrap
 from granufab.packing import Array, Packing, require
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["homogeneity", "local_strain"]
 
@@ -73,6 +76,8 @@ def homogeneity(strain: xr.Dataset | tuple[Packing, Packing]) -> Mapping[str, fl
     Raises:
         MissingData: there is one box only, or no strain between the states.
     """
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     data = strain if isinstance(strain, xr.Dataset) else local_strain(*strain)
     local, error = data["eps_q"].to_numpy(), data["eps_q_error"].to_numpy()
     if len(local) < 2:
@@ -122,6 +127,8 @@ def _fit(place: Array, displacement: Array) -> tuple[Array, Array]:
 
 
 def _strain_dataset(fits: list, side: int) -> xr.Dataset:
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     count = np.array([fit[0] for fit in fits])
     centre = np.array([fit[1] for fit in fits])
     strain = np.array([-0.5 * (fit[2] + fit[2].T) for fit in fits])

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.bootstrap import bootstrap_errors
@@ -39,6 +38,9 @@ from granufab.fabric.tensors import (
 )
 from granufab.history import SERIES_UNITS, Frame, Run
 from granufab.packing import Array, IntArray, Packing
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["measure", "measure_run", "quick_measure", "values_dataset"]
 
@@ -325,14 +327,9 @@ def _errors(
     replicas: int,
 ) -> dict[str, Value]:
     errors = bootstrap_errors(
-        packing,
-        criterion=rule,
-        z_definition=definition,
-        direction=direction,
-        minimum=minimum,
-        reach=reach,
-        replicas=replicas,
-    )
+        packing, criterion=rule, z_definition=definition, direction=direction,
+        minimum=minimum, reach=reach, replicas=replicas,
+    )  # fmt: skip
     return {f"{name}_error": value for name, value in errors.items()}
 
 
@@ -386,6 +383,9 @@ def values_dataset(
     rows: Sequence[Mapping[str, Value]], dim: str, attributes: Mapping[str, Any]
 ) -> xr.Dataset:
     """Rows of :func:`measure` as variables over ``dim``, NaN where unknown; words are left out."""
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     data = {}
     for name in rows[0]:
         column = [row[name] for row in rows]

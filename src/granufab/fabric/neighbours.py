@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy  # its parts load where they are used
 
 from granufab.errors import InvalidPacking
 from granufab.packing import Array, Cell, Contacts, IntArray, Packing
@@ -33,7 +33,11 @@ def neighbours_within(packing: Packing, gap: float) -> Contacts:
     owner, shift, ghost = _ghosts(wrapped, cell, cut)
     count = len(radius)
     points = np.concatenate([wrapped, ghost])
-    found = cKDTree(points).query_pairs(max(cut, 0.0), output_type="ndarray").astype(np.int64)
+    found = (
+        scipy.spatial.cKDTree(points)
+        .query_pairs(max(cut, 0.0), output_type="ndarray")
+        .astype(np.int64)
+    )
     found.sort(axis=1)
     found = found[found[:, 0] < count]
     owners = np.concatenate([np.arange(count), owner])

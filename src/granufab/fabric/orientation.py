@@ -7,15 +7,18 @@ so E = (z/2) P_n integrates to z/2 there.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
-from scipy.special import eval_legendre
+import scipy  # its parts load where they are used
 
 from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.tensors import fabric_tensor
 from granufab.fabric.variables import describe
 from granufab.packing import Array, Contacts, IntArray
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["orientation", "symmetry_axis"]
 
@@ -133,11 +136,11 @@ def _sphere(normal: Array, z: float, bins: int, axis: Array | None) -> xr.Datase
     cosine = np.minimum(np.abs(normal @ direction), 1.0)
     index = np.minimum(((1.0 - cosine) * bins).astype(np.int64), bins - 1)
     middle = 1.0 - (np.arange(bins) + 0.5) / bins
-    legendre = np.array([eval_legendre(mode, cosine) for mode in _MODES])
+    legendre = np.array([scipy.special.eval_legendre(mode, cosine) for mode in _MODES])
     factor = 2.0 * _MODES + 1.0
     amplitude = factor * legendre.mean(axis=1)
     error = factor * legendre.std(axis=1) / math.sqrt(len(cosine))
-    fit = 1.0 + amplitude[0] * eval_legendre(2, middle)
+    fit = 1.0 + amplitude[0] * scipy.special.eval_legendre(2, middle)
     # Mean of u² over a bin of width w is u² + w²/12.
     mean = fit + amplitude[0] * 1.5 / (12.0 * bins**2)
     data = _binned(np.bincount(index, minlength=bins), z, 2.0 * math.pi, fit, mean)
@@ -182,6 +185,8 @@ def _shares(power: Array, noise: Array) -> dict:
 
 
 def _dataset(data: dict, theta: Array, text: str) -> xr.Dataset:
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     return xr.Dataset(
         data,
         coords={

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.displacements import Range, States, Track, follow
@@ -13,6 +12,9 @@ from granufab.fabric.fluctuations import samples
 from granufab.fabric.relative_velocity import Tally, cluster_error
 from granufab.fabric.variables import describe
 from granufab.packing import Array
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["fluctuation_spectrum"]
 
@@ -130,6 +132,8 @@ def _fourier_sums(place: Array, moved: Array, most: np.ndarray) -> np.ndarray:
 
 
 def _dataset(tally: Tally, dimension: int, fit: tuple[float, float]) -> xr.Dataset:
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     clusters = tally.clusters
     whole = clusters.sum(axis=0)
     held = whole[0] > 0

@@ -10,8 +10,9 @@ both: <f·e_ψ> = −a_t f_0 sin2ψ, so a_t > 0 where tangential forces pull tow
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from granufab.errors import InvalidSettings
@@ -36,6 +37,9 @@ from granufab.fabric.ensemble import (
 from granufab.fabric.stress import stress_ratio, stress_tensor
 from granufab.fabric.variables import describe
 from granufab.packing import Array, require
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["anisotropy_stress_ratio", "stress_force_fabric"]
 
@@ -136,6 +140,9 @@ def stress_force_fabric(
         MissingData: no forces, no cell, no contacts, or these in too few directions.
         InvalidSettings: an unknown criterion or definition, an axis of wrong shape.
     """
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     sample = pool_contacts(
         states, criterion=criterion, z_definition=z_definition, minimum=minimum, axis=axis
     )

@@ -6,9 +6,9 @@ Source: Troadec, Radjai, Roux & Charmet, Phys. Rev. E 66, 041305 (2002); [Radjai
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.coordination import ZDefinition
@@ -19,6 +19,9 @@ from granufab.fabric.rattlers import contact_number
 from granufab.fabric.tensors import anisotropy, fabric_tensor, major_angle, signed_anisotropy
 from granufab.fabric.variables import describe
 from granufab.packing import Array, IntArray
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["texture"]
 
@@ -73,6 +76,9 @@ def texture(
         MissingData: no contacts, or no grain with two.
         InvalidSettings: bins, quantile or δθ out of range; an unknown criterion or definition.
     """
+
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     if bins < 3 or windows < 3:
         raise InvalidSettings(f"texture needs at least 3 bins and windows, got {bins}, {windows}")
     if not 0.0 <= quantile < 1.0:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import xarray as xr
 
 from granufab.errors import InvalidSettings, MissingData
 from granufab.fabric.criterion import Criterion, parse_criterion, select_contacts
@@ -24,6 +23,9 @@ from granufab.fabric.relative_velocity import (
 from granufab.fabric.variables import describe
 from granufab.history import packing_of
 from granufab.packing import Array, Cell, Packing, require
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["velocity_field"]
 
@@ -197,6 +199,8 @@ def _plane_axes(normal: Array) -> Array:
 
 
 def _dataset(sums: PairSums) -> xr.Dataset:
+    import xarray as xr  # slow to import: only where a Dataset is made
+
     maps = sums.folded_maps()
     whole = maps.sum(axis=0)
     count = whole[0]

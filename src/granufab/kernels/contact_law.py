@@ -14,14 +14,13 @@ stress-driven shape of the cell W_nt ≠ 0 and the 2D solution is one of three c
 
 from __future__ import annotations
 
-from granufab.kernels.access import choose
-from granufab.kernels.options import compiled, inlined
+from granufab.kernels.tracing import choose, larger, smaller, traced
 from granufab.kernels.vectors import axpy, norm, norm2, scale, shorten, sub
 
 __all__ = ["cone_defect", "crossed_law", "separate_law", "slide_or_stick"]
 
 
-@inlined
+@traced
 def separate_law(p_n, p_t, u_n, u_t, inverse_n, inverse_t, mu):
     """Exact impulse where normal and tangent do not couple (W_nt = 0).
 
@@ -33,12 +32,12 @@ def separate_law(p_n, p_t, u_n, u_t, inverse_n, inverse_t, mu):
     Returns:
         The new impulse (p_n, p_t).
     """
-    new_n = max(0.0, p_n - u_n * inverse_n)
+    new_n = larger(0.0, p_n - u_n * inverse_n)
     stick = axpy(-1.0 * inverse_t, u_t, p_t)
     return new_n, shorten(stick, mu * new_n)
 
 
-@inlined
+@traced
 def slide_or_stick(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
     """Exact 2D impulse where normal and tangent couple through the cell (W_nt ≠ 0).
 
@@ -51,7 +50,7 @@ def slide_or_stick(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
         w_nn, w_nt, w_tt: local Delassus matrix, ε included on the diagonal [1/kg].
         mu: friction coefficient [-].
     """
-    b_n = min(0.0, u_n - w_nn * p_n - w_nt * p_t)  # 0 where the contact opens: no impulse
+    b_n = smaller(0.0, u_n - w_nn * p_n - w_nt * p_t)  # 0 where the contact opens: no impulse
     b_t = u_t - w_nt * p_n - w_tt * p_t
     scale_ = 1.0 / (w_nn * w_tt - w_nt * w_nt)
     stick_n = (w_nt * b_t - w_tt * b_n) * scale_
@@ -64,7 +63,7 @@ def slide_or_stick(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
     return new_n, choose(sticks, stick_t, side * mu * slide_n)
 
 
-@inlined
+@traced
 def cone_defect(p_n, p_t, u_n, u_t, rho, mu):
     """Squared distance |P − proj_K(P − ρ(u + µ|u_t| n))|² of one contact from its law.
 
@@ -74,27 +73,16 @@ def cone_defect(p_n, p_t, u_n, u_t, rho, mu):
     trial_n = p_n - rho * (u_n + mu * norm(u_t))
     trial_t = axpy(-1.0 * rho, u_t, p_t)
     size = norm(trial_t)
-    edge = max(0.0, (trial_n + mu * size) / (1.0 + mu * mu))
-    inside = size <= mu * trial_n + min(0.0, trial_n)
+    edge = larger(0.0, (trial_n + mu * size) / (1.0 + mu * mu))
+    inside = size <= mu * trial_n + smaller(0.0, trial_n)
     new_n = choose(inside, trial_n, edge)
-    share = choose(inside, 1.0, mu * edge / max(size, 1e-300))
+    share = choose(inside, 1.0, mu * edge / larger(size, 1e-300))
     change = sub(p_t, scale(share, trial_t))
     return (p_n - new_n) * (p_n - new_n) + norm2(change)
 
 
+@traced
 def crossed_law(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
     """:func:`slide_or_stick` for a tangential tuple; there is none in 3D, where W_nt is 0."""
     new_n, new_t = slide_or_stick(p_n, p_t[0], u_n, u_t[0], w_nn, w_nt, w_tt, mu)
     return new_n, (new_t,)
-
-
-@compiled(crossed_law)
-def _crossed_law(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
-    def disk(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
-        new_n, new_t = slide_or_stick(p_n, p_t[0], u_n, u_t[0], w_nn, w_nt, w_tt, mu)
-        return new_n, (new_t,)
-
-    def sphere(p_n, p_t, u_n, u_t, w_nn, w_nt, w_tt, mu):
-        return p_n, p_t
-
-    return disk if p_t.count == 1 else sphere

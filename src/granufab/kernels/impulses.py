@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from granufab.kernels.access import address
 from granufab.kernels.cell import add_outer
-from granufab.kernels.options import kernel
+from granufab.kernels.options import kernel, part
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.vectors import (
     add,
@@ -25,10 +25,10 @@ from granufab.kernels.vectors import (
     tangential,
 )
 
-__all__ = ["apply_impulses", "local_velocity"]
+__all__ = ["apply_impulses", "apply_listed", "local_velocity"]
 
 
-@kernel
+@part
 def local_velocity(problem: Problem, motion, rate, c, like):
     """(u_n, u_t) of contact c without offsets: grains and free cell rates only [m/s]."""
     i, j = problem.first[c], problem.second[c]
@@ -42,13 +42,21 @@ def local_velocity(problem: Problem, motion, rate, c, like):
     return u_n, sub(tangential(u, n, u_n), turning)
 
 
-@kernel
-def apply_impulses(problem: Problem, state: State, like):
-    """Add M⁻¹ H P of every contact to motion and rate, which hold the free velocities."""
-    motion, rate = state.motion, state.rate
+@part
+def apply_listed(problem: Problem, state: State, listed, reach, rate, like):
+    """Add M⁻¹ H P of some contacts to the velocities of the bodies and to ``rate``.
+
+    Args:
+        problem, state: contacts, their impulses, velocities.
+        listed, reach: contacts listed[reach[0]:reach[1]].
+        rate: free rates of the cell [1/s], shape (D, D).
+        like: tuple of D zeros.
+    """
+    motion = state.motion
     pushed, weight = address(rate), address(problem.weight)
     dilation = 0.0
-    for c in range(len(problem.length)):
+    for at in range(reach[0], reach[1]):
+        c = listed[at]
         i, j = problem.first[c], problem.second[c]
         n = load(problem.normal, c, like)
         p_n, p_t = state.impulse_n[c], load_tangent(state.impulse_t, c, like)
@@ -66,3 +74,9 @@ def apply_impulses(problem: Problem, state: State, like):
     if not problem.coupled:
         for k in range(len(like)):
             rate[k, k] += dilation
+
+
+@kernel
+def apply_impulses(problem: Problem, state: State, listed, like):
+    """Add M⁻¹ H P of the listed contacts to motion and rate of the state."""
+    apply_listed(problem, state, listed, (0, len(listed)), state.rate, like)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from granufab.kernels.options import kernel
+from granufab.kernels.memory import empty, unlinked, zeros
+from granufab.kernels.options import kernel, part
+from granufab.kernels.tracing import larger, nearest, smaller, whole
 
 __all__ = ["insert_randomly"]
 
@@ -24,18 +26,20 @@ def insert_randomly(radius, size, periodic, tries, seed):
     """
     np.random.seed(seed)  # noqa: NPY002  (numba's own stream)
     count, dimension = len(radius), len(size)
-    widest = 2.0 * radius.max()
-    bins = np.empty(dimension, np.int64)
+    widest = 0.0
+    for i in range(count):
+        widest = larger(widest, 2.0 * radius[i])
+    bins = empty((dimension,), np.int64)
     total = 1
     for k in range(dimension):
-        number = int(size[k] / widest)
+        number = whole(size[k] / widest)
         bins[k] = number if number >= 3 else 1
         total *= bins[k]
-    head = np.full(total, -1, np.int64)
-    following = np.full(count, -1, np.int64)
-    position = np.zeros((count, dimension))
-    trial = np.empty(dimension)
-    where = np.empty(dimension, np.int64)
+    head = unlinked((total,), np.int64)
+    following = unlinked((count,), np.int64)
+    position = zeros((count, dimension), np.float64)
+    trial = empty((dimension,), np.float64)
+    where = empty((dimension,), np.int64)
     for i in range(count):
         placed = False
         for _ in range(tries):
@@ -43,7 +47,7 @@ def insert_randomly(radius, size, periodic, tries, seed):
             for k in range(dimension):
                 low = 0.0 if periodic[k] else radius[i]
                 trial[k] = low + (size[k] - 2.0 * low) * np.random.random()  # noqa: NPY002
-                where[k] = min(int(trial[k] / size[k] * bins[k]), bins[k] - 1)
+                where[k] = smaller(whole(trial[k] / size[k] * bins[k]), bins[k] - 1)
                 home = home * bins[k] + where[k]
             if not _overlaps(
                 trial, radius, i, position, size, periodic, bins, where, head, following
@@ -59,7 +63,7 @@ def insert_randomly(radius, size, periodic, tries, seed):
     return position, count
 
 
-@kernel
+@part
 def _overlaps(trial, radius, i, position, size, periodic, bins, where, head, following):
     dimension = len(size)
     for code in range(3**dimension):
@@ -82,7 +86,7 @@ def _overlaps(trial, radius, i, position, size, periodic, bins, where, head, fol
             for k in range(dimension):
                 x = trial[k] - position[j, k]
                 if periodic[k]:
-                    x -= size[k] * np.round(x / size[k])
+                    x -= size[k] * nearest(x / size[k])
                 square += x * x
             if square < (radius[i] + radius[j]) ** 2:
                 return True

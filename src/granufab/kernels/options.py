@@ -15,14 +15,13 @@ from typing import Any, TypeVar
 
 from numba import extending, njit
 from numba.core import config
-from numba.extending import overload
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 
-__all__ = ["ARITHMETIC", "cache_folder", "compiled", "inlined", "intrinsic", "kernel"]
+__all__ = ["ARITHMETIC", "cache_folder", "inlined", "intrinsic", "kernel", "part", "steady"]
 
 F = TypeVar("F", bound=Callable[..., Any])
 ARITHMETIC: dict[str, Any] = {"fastmath": {"contract", "nsz", "nnan"}, "error_model": "numpy"}
-
-_INLINED: dict[str, Any] = {**ARITHMETIC, "forceinline": True}
 
 
 def cache_folder() -> str:
@@ -52,21 +51,73 @@ config.CACHE_DIR = cache_folder()  # type: ignore[attr-defined]
 
 def kernel(function: F) -> F:
     """Compile ``function`` with the package's options, cached on disk, releasing the GIL."""
-    compiled: Any = njit(cache=True, nogil=True, **ARITHMETIC)(function)
-    return compiled
+    compiled: Any = njit
+    return compiled(cache=True, nogil=True, no_cfunc_wrapper=True, **ARITHMETIC)(function)
+
+
+def part(function: F) -> F:
+    """Compile ``function`` where kernels call it; called from Python it stays plain text."""
+    register: Any = extending.register_jitable
+    return register(nogil=True, no_cfunc_wrapper=True, pipeline_class=_PartCompiler, **ARITHMETIC)(
+        function
+    )
 
 
 def inlined(function: F) -> F:
-    """Compile ``function`` as a part of the kernels that call it."""
-    compiled: Any = njit(nogil=True, **_INLINED)(function)
-    return compiled
+    """As :func:`part`, and the kernels that call it hold a copy."""
+    register: Any = extending.register_jitable
+    return register(
+        nogil=True,
+        no_cfunc_wrapper=True,
+        pipeline_class=_PartCompiler,
+        forceinline=True,
+        **ARITHMETIC,
+    )(function)
 
 
-def compiled(function: Callable[..., Any]) -> Callable[[F], F]:
-    """The decorated function chooses, by types, the text that kernels inline for ``function``."""
-    choose: Any = overload
-    return choose(function, jit_options=_INLINED)
+class _NoEnvironment:
+    """Parts have no entry point of their own, so none of what Python would need there."""
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """Nothing to set."""
+
+
+class _PartLibrary(JITCodeLibrary):
+    """Code that is optimised and made to run only in the kernels it is linked into.
+
+    Numba does both for every function on its own first, and throws it away.
+    """
+
+    codegen = _NoEnvironment()  # type: ignore[assignment]
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """None: only kernels call it."""
+        self._ensure_finalized()
+        return 0
+
+
+class _PartCompiler(Compiler):
+    def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:
+        super().__init__(typing, target, _PartLibrary(target.codegen(), "part"), *rest)
 
 
 intrinsic: Any = extending.intrinsic
 """A function of kernels written in LLVM's language."""
+
+
+def steady(function: F) -> F:
+    """As :func:`kernel`, for functions that allocate nothing: no references are counted."""
+    compiled: Any = njit
+    return compiled(cache=True, nogil=True, no_cfunc_wrapper=True, _nrt=False, **ARITHMETIC)(
+        function
+    )

@@ -12,16 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granufab.kernels.access import address
-from granufab.kernels.cell import cell_weight
-from granufab.kernels.lanes import WIDTH
-from granufab.kernels.options import compiled, kernel
-from granufab.kernels.problem import Problem
-from granufab.kernels.vectors import inverse_mass, load
+from granufab.kernels.options import part
+from granufab.kernels.tracing import traced
 
-__all__ = ["Slots", "fields", "pack", "places", "schedule", "unpack"]
-
-BLOCK, LEAP = 256, 331  # a prime beyond the block: every contact is visited once
+__all__ = ["Slots", "fields", "places"]
 
 
 class Slots(NamedTuple):
@@ -62,6 +56,7 @@ class Places(NamedTuple):
     cross: int
 
 
+@traced
 def places(like):
     """Where the fields begin; ``like`` is a tuple of D zeros, numbers or lanes."""
     return (
@@ -71,151 +66,8 @@ def places(like):
     )
 
 
-@compiled(places)
-def _places(like):
-    if like.count == 2:
-        return lambda like: Places(0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12)
-    return lambda like: Places(0, 3, 4, 5, 8, 9, 10, 11, 12, 15, 16, 19)
-
-
-@kernel
+@part
 def fields(like, coupled):
     """Numbers that a contact takes."""
     cross = places(like).cross
     return cross + 1 if coupled and len(like) == 2 else cross
-
-
-@kernel
-def schedule(first, second, grain_count, chunk, chunk_count, order):
-    """Put contacts into batches of eight that share no grain; walls and cells may be shared.
-
-    Blocks of contacts keep their order, so a sweep moves through memory: each contact goes into the
-    first batch with room after the last ones of its grains.
-
-    Args:
-        first, second: bodies i, j, shape (contact_count,).
-        grain_count: bodies from here on (walls) never move.
-        chunk: of every body, shape (body_count,).
-        chunk_count: number of chunks.
-        order: out: slot of every contact, shape (contact_count,).
-    Returns:
-        First batch of every chunk, of the contacts between chunks, and the end.
-    """
-    count = len(first)
-    starts = np.zeros(chunk_count + 2, np.int64)
-    heads = np.zeros(chunk_count + 2, np.int64)
-    for c in range(count):
-        heads[_home(chunk, first[c], second[c], grain_count, chunk_count) + 1] += 1
-    for k in range(chunk_count + 1):
-        heads[k + 1] += heads[k]
-    listed = np.empty(count, np.int64)
-    fill = heads.copy()
-    for c in range(count):
-        home = _home(chunk, first[c], second[c], grain_count, chunk_count)
-        listed[fill[home]] = c
-        fill[home] += 1
-    last = np.full(grain_count, -1, np.int64)
-    taken = np.zeros(count + 1, np.int64)
-    low, top = 0, 0
-    for k in range(chunk_count + 1):
-        starts[k], low = top, top
-        for at in range(heads[k], heads[k + 1]):
-            c = listed[_mixed(at, heads[k], heads[k + 1])]
-            i, j = first[c], second[c]
-            batch = max(low, last[i] + 1)
-            if j < grain_count:
-                batch = max(batch, last[j] + 1)
-            while taken[batch] == WIDTH:
-                batch += 1
-            order[c] = batch * WIDTH + taken[batch]
-            taken[batch] += 1
-            last[i] = batch
-            if j < grain_count:
-                last[j] = batch
-            top = max(top, batch + 1)
-            while taken[low] == WIDTH:
-                low += 1
-    starts[chunk_count + 1] = top
-    return starts
-
-
-@kernel
-def _mixed(at, head, end):
-    """Visit each block in leaps: contacts in a row share grains and would have to queue."""
-    start = head + (at - head) // BLOCK * BLOCK
-    size = min(BLOCK, end - start)
-    return start + (at - start) * LEAP % size
-
-
-@kernel
-def _home(chunk, i, j, grain_count, chunk_count):
-    """Chunk of a contact, or chunk_count for one between chunks."""
-    if j >= grain_count or chunk[i] == chunk[j]:
-        return chunk[i]
-    return chunk_count
-
-
-@kernel
-def pack(problem: Problem, motion, impulse_n, impulse_t, order, slots: Slots, like):
-    """Fill the slots with the problem and its impulses; empty lanes get an open contact."""
-    values = slots.values
-    size = fields(like, problem.coupled) * WIDTH
-    at = places(like)
-    spare = len(motion) - 1
-    for slot in range(slots.starts[-1] * WIDTH):
-        slots.first[slot], slots.second[slot] = spare, spare
-    for k in range(slots.starts[-1] * size):
-        values[k] = 0.0
-    eps, kappa, weight = problem.softness, problem.spin_factor, address(problem.weight)
-    for c in range(len(order)):
-        slot = order[c]
-        base = slot // WIDTH * size + slot % WIDTH
-        i, j = problem.first[c], problem.second[c]
-        slots.first[slot], slots.second[slot] = i, j
-        n, length = load(problem.normal, c, like), problem.length[c]
-        for k in range(len(like)):
-            values[base + WIDTH * (at.normal + k)] = n[k]
-        values[base + WIDTH * at.length] = length
-        values[base + WIDTH * at.offset_n] = problem.offset_n[c]
-        values[base + WIDTH * at.mu] = problem.mu[c]
-        values[base + WIDTH * at.impulse_n] = impulse_n[c]
-        values[base + WIDTH * at.before_n] = impulse_n[c]
-        for k in range(impulse_t.shape[1]):
-            values[base + WIDTH * (at.offset_t + k)] = problem.offset_t[c, k]
-            values[base + WIDTH * (at.impulse_t + k)] = impulse_t[c, k]
-            values[base + WIDTH * (at.before_t + k)] = impulse_t[c, k]
-        mass = inverse_mass(motion, i, like) + inverse_mass(motion, j, like)
-        w_n, w_t = mass + eps, mass + kappa * mass + eps
-        if problem.coupled:
-            extra_n, extra_nt, extra_t = cell_weight(weight, n, length)
-            w_n, w_t = w_n + extra_n, w_t + extra_t
-            if len(like) == 2:
-                values[base + WIDTH * at.cross] = extra_nt
-        else:
-            w_n += length * length * problem.dilation_weight
-        crossed = problem.coupled and len(like) == 2
-        values[base + WIDTH * at.inverse_n] = w_n if crossed else 1.0 / w_n
-        values[base + WIDTH * at.inverse_t] = w_t if crossed else 1.0 / w_t
-    _fill_empty(slots, size, at, spare)
-
-
-@kernel
-def _fill_empty(slots: Slots, size, at, spare):
-    for slot in range(slots.starts[-1] * WIDTH):
-        if slots.first[slot] == spare:
-            base = slot // WIDTH * size + slot % WIDTH
-            slots.values[base + WIDTH * at.offset_n] = 1.0
-            slots.values[base + WIDTH * at.inverse_n] = 1.0
-            slots.values[base + WIDTH * at.inverse_t] = 1.0
-
-
-@kernel
-def unpack(slots: Slots, size, order, impulse_n, impulse_t, like):
-    """Write the impulses of the slots back, in the order of the problem."""
-    at = places(like)
-    for c in range(len(order)):
-        slot = order[c]
-        base = slot // WIDTH * size + slot % WIDTH
-        impulse_n[c] = slots.values[base + WIDTH * at.impulse_n]
-        for k in range(impulse_t.shape[1]):
-            impulse_t[c, k] = slots.values[base + WIDTH * (at.impulse_t + k)]

@@ -22,7 +22,7 @@ import numpy as np
 
 from granufab.kernels.access import address, item, set_item
 from granufab.kernels.cell import move_cell
-from granufab.kernels.options import inlined, kernel
+from granufab.kernels.options import inlined, part
 from granufab.kernels.slots import Slots
 from granufab.kernels.sweep import Law, defects, sweep
 from granufab.kernels.team import given_up, meet
@@ -60,7 +60,7 @@ class Work(NamedTuple):
     counters: np.ndarray
 
 
-@kernel
+@part
 def solve(slots: Slots, bodies, law: Law, work: Work, like, size, settings, member, members):
     """Sweep until the residual is met or the sweeps run out.
 
@@ -100,7 +100,7 @@ def solve(slots: Slots, bodies, law: Law, work: Work, like, size, settings, memb
     return int(control[SWEEPS]), control[RESIDUAL], control[SHARE], control[VIOLATION]
 
 
-@kernel
+@part
 def _begin(work: Work):
     for k in range(CONTROLS):
         work.control[k] = 0.0
@@ -113,13 +113,13 @@ def _begin(work: Work):
             work.rate_before[k, l] = rate[k, l]
 
 
-@kernel
+@part
 def _rows(count, member, members):
     """Share of the bodies of a member."""
     return count * member // members, count * (member + 1) // members
 
 
-@kernel
+@part
 def _remember(bodies, work: Work, member, members):
     first, end = _rows(len(bodies), member, members)
     for i in range(first, end):
@@ -135,7 +135,7 @@ def _extrapolate_line(now, before, start, end, beta):
         set_item(before, k, value)
 
 
-@kernel
+@part
 def _extrapolate(bodies, work: Work, beta, member, members):
     """now ← now + β (now − before), before ← now, for this member's bodies (first: the cell)."""
     first, end = _rows(len(bodies), member, members)
@@ -150,7 +150,7 @@ def _extrapolate(bodies, work: Work, beta, member, members):
                 work.rate_before[k, l] = value
 
 
-@kernel
+@part
 def _start_cell(cell, shared):
     """The cell as a chunk sees it before its first contact: the shared rates, no push."""
     for k in range(cell.shape[1]):
@@ -158,7 +158,7 @@ def _start_cell(cell, shared):
             cell[0, k, l], cell[1, k, l], cell[2, k, l] = shared[0, k, l], 0.0, 0.0
 
 
-@kernel
+@part
 def _sweep_all(slots: Slots, bodies, law: Law, work: Work, like, size, member, members):
     """One sweep over all chunks, then over the contacts between them."""
     chunks = len(slots.starts) - 2
@@ -179,7 +179,7 @@ def _sweep_all(slots: Slots, bodies, law: Law, work: Work, like, size, member, m
         work.sums[chunks, 0], work.sums[chunks, 1] = moved, length2
 
 
-@kernel
+@part
 def _decide(work: Work, settings, state, watch):
     """After a sweep: the momentum of the next one, and whether the residual is to be taken."""
     tolerance, max_sweeps, first_cap, floor, patience = settings
@@ -216,7 +216,7 @@ def _decide(work: Work, settings, state, watch):
     )  # fmt: skip
 
 
-@kernel
+@part
 def _consider(work: Work, settings, state, watch):
     """After the residual was taken: done, or another cap where nothing moves."""
     cap, highest, age, calm, least = state
@@ -240,7 +240,7 @@ def _consider(work: Work, settings, state, watch):
     )  # fmt: skip
 
 
-@kernel
+@part
 def _judge(slots: Slots, bodies, law: Law, work: Work, like, size, settings, member, members):
     """Take the residual; done where it is met or no sweeps are allowed."""
     chunks = len(slots.starts) - 1
@@ -268,7 +268,7 @@ def _judge(slots: Slots, bodies, law: Law, work: Work, like, size, settings, mem
     meet(work.counters, members)
 
 
-@kernel
+@part
 def next_cap(cap, first):
     """Caps to try in turn where the residual stalls: halves, then none, then the first again."""
     if cap > 0.2:

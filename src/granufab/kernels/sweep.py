@@ -18,17 +18,16 @@ import numpy as np
 
 from granufab.kernels.access import (
     address,
-    announce,
     body_of,
-    greatest,
+    find_body,
     inverse_mass_of,
     like_numbers,
+    prefetch,
     put,
     put_body,
     put_tangent,
     spin_of,
     stride,
-    summed,
     take,
     take_body,
     take_tangent,
@@ -38,8 +37,9 @@ from granufab.kernels.access import (
 from granufab.kernels.cell import add_outer, cell_weight, hand_on, stretching
 from granufab.kernels.contact_law import cone_defect, crossed_law, separate_law
 from granufab.kernels.lanes import WIDTH
-from granufab.kernels.options import inlined, kernel
+from granufab.kernels.options import part
 from granufab.kernels.slots import Slots, places
+from granufab.kernels.tracing import greatest, larger, smaller, summed, traced
 from granufab.kernels.vectors import (
     add,
     axpy,
@@ -78,19 +78,19 @@ class _Numbers(NamedTuple):
     dilation_weight: float
 
 
-@inlined
+@traced
 def numbers_of(law: Law):
     """The numbers of the law."""
     return _Numbers(law.softness, law.spin_factor, law.coupled, law.dilation_weight)
 
 
-@inlined
+@part
 def lag_of(batch_count):
     """Batches between two moves of the cell."""
-    return max(1, min(LAG // WIDTH, batch_count // LAGS))
+    return larger(1, smaller(LAG // WIDTH, batch_count // LAGS))
 
 
-@kernel
+@part
 def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     """One forward sweep over some batches.
 
@@ -118,13 +118,14 @@ def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     lag = lag_of(slots.starts[-1])
     until = lag
     for batch in range(start, end):
-        announce(values, table, one, two, min(batch + AHEAD, end - 1), size, like)
+        _announce(values, table, one, two, smaller(batch + AHEAD, end - 1), like)
         for lane in range(0, WIDTH, stride(like)):
             base, place = batch * size + lane, batch * WIDTH + lane
-            step, new, turn = _visit(
-                values, one, two, table, base, place,
-                law, beta, dilation, flow, pushes, weight, like,
-            )  # fmt: skip
+            at = (values, one, two, table, base, place)
+            if law.coupled:
+                step, new, turn = _visit_coupled(at, law, beta, flow, pushes, weight, like)
+            else:
+                step, new, turn = _visit(at, law, beta, dilation, like)
             moved += step
             length2 += new
             pending += turn
@@ -145,29 +146,46 @@ def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     return moved, length2
 
 
-@inlined
-def _visit(
-    values, one, two, bodies, base, place, law, beta, dilation, rate, scratch, weight, like
-):  # fmt: skip
+@traced
+def _announce(values, bodies, one, two, batch, like):
+    """Ask for the memory of a batch, some batches before it is swept."""
+    if isinstance(like[0], tuple):
+        prefetch(values, bodies, one, two, batch, places(like[0]).cross + 1, like)
+
+
+@traced
+def _visit(where, law, beta, dilation, like):
+    """:func:`_update` where the cell is free to dilate only."""
+    return _update(where, law, beta, dilation, None, like)
+
+
+@traced
+def _visit_coupled(where, law, beta, rate, scratch, weight, like):
+    """:func:`_update` where the cell is free to change its shape."""
+    return _update(where, law, beta, None, (rate, scratch, weight), like)
+
+
+def _update(where, law, beta, dilation, cell, like):
     """Solve one contact (or eight); returns |ΔP|², |P|² and the push on the dilation."""
+    values, one, two, bodies, base, place = where
     numbers = like_numbers(like)
     at = places(numbers)
-    body_i = take_body(bodies, one, place, numbers)
-    body_j = take_body(bodies, two, place, numbers)
+    i, j = find_body(bodies, one, place, numbers), find_body(bodies, two, place, numbers)
+    body_i, body_j = take_body(bodies, i, numbers), take_body(bodies, j, numbers)
     n = take_vector(values, base, at.normal, numbers)
     length = take(values, base, at.length, numbers)
     x_n = take(values, base, at.impulse_n, numbers)
     x_t = take_tangent(values, base, at.impulse_t, numbers)
     y_n = x_n + beta * (x_n - take(values, base, at.before_n, numbers))
     y_t = axpy(beta, sub(x_t, take_tangent(values, base, at.before_t, numbers)), x_t)
-    u_n, u_t = _velocity(body_i, body_j, n, length, law, dilation, rate)
+    u_n, u_t = _velocity(body_i, body_j, n, length, dilation, cell)
     u_n = u_n + (take(values, base, at.offset_n, numbers) + law.softness * y_n)
     u_t = add(u_t, take_tangent(values, base, at.offset_t, numbers))
     u_t = axpy(law.softness, y_t, u_t)
     w_n = take(values, base, at.inverse_n, numbers)
     w_t = take(values, base, at.inverse_t, numbers)
     mu = take(values, base, at.mu, numbers)
-    if law.coupled and len(numbers) == 2:
+    if cell and len(numbers) == 2:
         cross = take(values, base, at.cross, numbers)
         new_n, new_t = crossed_law(y_n, y_t, u_n, u_t, w_n, cross, w_t, mu)
     else:
@@ -178,32 +196,30 @@ def _visit(
     put(values, base, at.impulse_n, new_n)
     put_tangent(values, base, at.impulse_t, new_t)
     push = compose(n, d_n, d_t)
-    turn = scale(-1.0 * law.spin_factor, moment(n, d_t))
+    turn = scale(-law.spin_factor, moment(n, d_t))
     m_i, m_j = inverse_mass_of(body_i), inverse_mass_of(body_j)
-    v_i = axpy(-1.0 * m_i, push, velocity_of(body_i))
+    v_i = axpy(-m_i, push, velocity_of(body_i))
     v_j = axpy(m_j, push, velocity_of(body_j))
-    put_body(bodies, one, place, body_of(v_i, axpy(m_i, turn, spin_of(body_i)), body_i))
-    put_body(bodies, two, place, body_of(v_j, axpy(m_j, turn, spin_of(body_j)), body_j))
-    if law.coupled:
+    put_body(bodies, i, body_of(v_i, axpy(m_i, turn, spin_of(body_i)), body_i))
+    put_body(bodies, j, body_of(v_j, axpy(m_j, turn, spin_of(body_j)), body_j))
+    if cell:
+        _, scratch, weight = cell
         add_outer(scratch, weight, push, scale(length, n))
     stretched = law.dilation_weight * summed(length * d_n)
     return summed(d_n * d_n + norm2(d_t)), summed(new_n * new_n + norm2(new_t)), stretched
 
 
-@inlined
-def _velocity(body_i, body_j, n, length, law, dilation, rate):
+def _velocity(body_i, body_j, n, length, dilation, cell):
     """(u_n, u_t) of grains and free cell, without offsets."""
     u = sub(velocity_of(body_j), velocity_of(body_i))
-    if law.coupled:
-        u = add(u, scale(length, stretching(rate, n)))
+    if cell:
+        u = add(u, scale(length, stretching(cell[0], n)))
     u_n = dot(n, u)
     u_t = sub(tangential(u, n, u_n), slip(add(spin_of(body_i), spin_of(body_j)), n))
-    if not law.coupled:
-        u_n = u_n + dilation * length
-    return u_n, u_t
+    return u_n if cell else u_n + dilation * length, u_t
 
 
-@kernel
+@part
 def defects(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     """What some batches add to the residual ‖P − proj_K(P − ρ(ũ + µ|u_t| n))‖ / ‖P‖.
 
@@ -223,36 +239,50 @@ def defects(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     for batch in range(reach[0], reach[1]):
         for lane in range(0, WIDTH, stride(like)):
             base, place = batch * size + lane, batch * WIDTH + lane
-            far, new, u_n = _defect(
-                values, one, two, table, base, place, law, dilation, rate, weight, like
-            )
-            total += summed(far)
-            worst = max(worst, greatest(far))
-            length2 += summed(new)
-            violation = max(violation, greatest(-1.0 * u_n))
+            at = (values, one, two, table, base, place)
+            if law.coupled:
+                far, most, new, closing = _defect_coupled(at, law, rate, weight, like)
+            else:
+                far, most, new, closing = _defect(at, law, dilation, like)
+            total += far
+            worst = larger(worst, most)
+            length2 += new
+            violation = larger(violation, closing)
     return total, worst, length2, violation
 
 
-@inlined
-def _defect(values, one, two, bodies, base, place, law, dilation, rate, weight, like):
-    """Squared distance from the law, |P|² and ũ_n of one contact (or eight)."""
+@traced
+def _defect(where, law, dilation, like):
+    """:func:`_distance` where the cell is free to dilate only."""
+    return _distance(where, law, dilation, None, like)
+
+
+@traced
+def _defect_coupled(where, law, rate, weight, like):
+    """:func:`_distance` where the cell is free to change its shape."""
+    return _distance(where, law, None, (rate, weight), like)
+
+
+def _distance(where, law, dilation, cell, like):
+    """Distance² from the law, the largest, |P|², worst −ũ_n of one contact (or eight)."""
+    values, one, two, bodies, base, place = where
     numbers = like_numbers(like)
     at = places(numbers)
-    body_i = take_body(bodies, one, place, numbers)
-    body_j = take_body(bodies, two, place, numbers)
+    i, j = find_body(bodies, one, place, numbers), find_body(bodies, two, place, numbers)
+    body_i, body_j = take_body(bodies, i, numbers), take_body(bodies, j, numbers)
     n = take_vector(values, base, at.normal, numbers)
     length = take(values, base, at.length, numbers)
     p_n = take(values, base, at.impulse_n, numbers)
     p_t = take_tangent(values, base, at.impulse_t, numbers)
-    u_n, u_t = _velocity(body_i, body_j, n, length, law, dilation, rate)
+    u_n, u_t = _velocity(body_i, body_j, n, length, dilation, cell)
     u_n = u_n + (take(values, base, at.offset_n, numbers) + law.softness * p_n)
     u_t = add(u_t, take_tangent(values, base, at.offset_t, numbers))
     u_t = axpy(law.softness, p_t, u_t)
     w_n = inverse_mass_of(body_i) + inverse_mass_of(body_j)
-    if law.coupled:
-        w_n = w_n + cell_weight(weight, n, length)[0]
+    if cell:
+        w_n = w_n + cell_weight(cell[1], n, length)[0]
     else:
         w_n = w_n + length * length * law.dilation_weight
     mu = take(values, base, at.mu, numbers)
-    far = cone_defect(p_n, p_t, u_n, u_t, 1.0 / max(w_n, 1e-300), mu)
-    return far, p_n * p_n + norm2(p_t), u_n
+    far = cone_defect(p_n, p_t, u_n, u_t, 1.0 / larger(w_n, 1e-300), mu)
+    return summed(far), greatest(far), summed(p_n * p_n + norm2(p_t)), greatest(-u_n)

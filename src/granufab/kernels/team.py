@@ -13,7 +13,7 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 
-from granufab.kernels.options import inlined, intrinsic, kernel
+from granufab.kernels.options import inlined, intrinsic, part
 
 __all__ = ["COUNTERS", "GIVE_UP", "given_up", "meet"]
 
@@ -74,7 +74,7 @@ def given_up(counters):
     return _read(counters, GIVE_UP) != 0
 
 
-@kernel
+@part
 def meet(counters, members):
     """Wait until all members are here; what each wrote before is seen by all after.
 

@@ -18,8 +18,8 @@ from typing import Any
 from granufab.errors import GranufabError, NotConverged
 from granufab.history import Run
 from granufab.reproduce.case_folder import Progress, RunCase, run_into_folder
-from granufab.simulate.contact_solver import thread_count
 from granufab.simulate.settings import Case, Sample
+from granufab.simulate.team import thread_count
 
 __all__ = ["Job", "nearest_sample", "run_jobs"]
 

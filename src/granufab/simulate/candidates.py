@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
-from granufab.kernels.motion import measure_gaps, turn_tangents
 from granufab.kernels.neighbours import find_pairs, find_wall_pairs
+from granufab.kernels.step_arrays import Pairs
 from granufab.packing import Array, Contacts, IntArray, WallContacts
 
 __all__ = ["Candidates"]
@@ -38,6 +41,7 @@ class Candidates:
         self.impulse_t = np.zeros((count, self.tangents))
         self.memory_t = np.zeros((count, self.tangents))
         self.friction = np.zeros(count)
+        self.home = np.zeros(count, np.int64)
 
     @property
     def count(self) -> int:
@@ -62,6 +66,7 @@ class Candidates:
         cell: tuple[Array, Array, np.ndarray],
         skin: float,
         friction: tuple[float, float],
+        run: Callable[..., Any] | None = None,
     ) -> None:
         """Find all pairs within ``skin`` [m], keep known impulses.
 
@@ -71,18 +76,13 @@ class Candidates:
             cell: (matrix, origin, periodic).
             skin: surface distance [m].
             friction: (µ between grains, µ on walls).
+            run: team that searches, see :func:`granufab.kernels.neighbours.find_pairs`.
         """
         matrix, origin, periodic = cell
-        inverse = np.linalg.inv(matrix)
-        capacity = max(64, (self.dimension * 4) * len(radius), 2 * self.count)
-        while True:
-            pairs, images, found = find_pairs(
-                position, radius, matrix, inverse, origin, periodic, skin, capacity
-            )
-            if found <= capacity:
-                break
-            capacity = found
-        pairs, images = pairs[:found], images[:found]
+        pairs, images = find_pairs(
+            position, radius, cell, skin, room=max(2 * self.dimension * len(radius), self.count),
+            run=run,
+        )  # fmt: skip
         if not periodic.all():
             room = 2 * self.dimension * len(radius)
             walls, touching = find_wall_pairs(
@@ -103,21 +103,18 @@ class Candidates:
         self.impulse_n[known] = old_n[source]
         self.impulse_t[known] = old_t[source]
 
-    def measure(
-        self,
-        position: Array,
-        radius: Array,
-        matrix: Array,
-        origin: Array,
-        like: tuple[float, ...],
-    ) -> None:
-        """Normals, lengths and gaps at the present positions; impulses turn with the normals."""
-        measure_gaps(
-            position, radius, matrix, origin, self.pairs, self.images, self.grain_count,
-            self.normal, self.length, self.gap,
+    def divide(self, chunk: IntArray, chunk_count: int) -> None:
+        """Note in which chunk of grains each pair lies; ``chunk_count`` for those between."""
+        first, second = self.pairs[:, 0], self.pairs[:, 1]
+        inner = chunk[first] == chunk[np.where(second < self.grain_count, second, first)]
+        self.home[:] = np.where(inner, chunk[first], chunk_count)
+
+    def arrays(self) -> Pairs:
+        """The candidates, for kernels; valid until the next search."""
+        return Pairs(
+            self.pairs, self.images, self.normal, self.length, self.gap, self.active,
+            self.impulse_n, self.impulse_t, self.memory_t, self.friction, self.home,
         )  # fmt: skip
-        if self.dimension == 3:
-            turn_tangents(self.impulse_t, self.normal, like)
 
     def impulses(self) -> Array:
         """P of every candidate in global axes [N s], shape (count, D)."""
@@ -129,17 +126,6 @@ class Candidates:
     def virial(self) -> Array:
         """Σ P⊗ℓ over all candidates [N m s], shape (D, D)."""
         return self.impulses().T @ (self.normal * self.length[:, None])
-
-    def remember_tangents(self) -> None:
-        """Keep the tangential impulses the step began with: the springs' memory."""
-        self.memory_t[:] = self.impulse_t
-
-    def keep_impulses(self, chosen: IntArray, impulse_n: Array, impulse_t: Array) -> None:
-        """Take the solved impulses; pairs outside the solve carry none."""
-        self.impulse_n[:] = 0.0
-        self.impulse_t[:] = 0.0
-        self.impulse_n[chosen] = impulse_n
-        self.impulse_t[chosen] = impulse_t
 
     def shear_images(self, flow: int, axis: int, turns: int) -> None:
         """Rewrite images after lattice vector ``axis`` lost ``turns`` of vector ``flow``."""

@@ -11,7 +11,7 @@ from granufab.fabric import quick_measure
 from granufab.fabric.criterion import force_threshold
 from granufab.history import Frame, StepStatistics
 from granufab.packing import Array, Cell, Contacts, Grains, IntArray, Packing, WallContacts
-from granufab.simulate.step_report import StepReport
+from granufab.simulate.step_report import StepReports
 from granufab.simulate.stepping import Simulation
 
 __all__ = ["StepTally", "capture_frame", "capture_packing", "measure_now", "merge", "series_row"]
@@ -122,16 +122,16 @@ class StepTally:
             "pressure_error": 0.0,
         }
 
-    def add(self, report: StepReport, pressure_error: float) -> None:
-        """Count one step."""
-        self._steps += 1
-        self._sweeps += report.sweeps
-        self._nonconverged += not report.converged
-        self._updates += report.sweeps * report.contacts
+    def add(self, reports: StepReports) -> None:
+        """Count steps."""
+        self._steps += len(reports)
+        self._sweeps += int(reports.sweeps.sum())
+        self._nonconverged += int((~reports.converged).sum())
+        self._updates += int((reports.sweeps * reports.contacts).sum())
         worst = self._worst
         for name in ("residual", "residual_contact", "violation", "overlap"):
-            worst[name] = max(worst[name], getattr(report, name))
-        worst["pressure_error"] = max(worst["pressure_error"], pressure_error)
+            worst[name] = max(worst[name], float(getattr(reports, name).max()))
+        worst["pressure_error"] = max(worst["pressure_error"], float(reports.stress_error.max()))
 
     def take(self, kinetic_ratio: float) -> StepStatistics:
         """The statistics since the last call, which start again."""

@@ -1,22 +1,37 @@
-"""How the cell moves: exact affine steps, and the shorter lattice of a sheared cell."""
+"""The moving cell: its tensors in the memory of the steps, and the shorter lattice when sheared."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
 from granufab.packing import Array, IntArray
 
-__all__ = ["matrix_exponential", "shorten_cell"]
+__all__ = ["Tensor", "shorten_cell"]
 
 TILT_LIMIT = 0.5001
 
 
-def matrix_exponential(matrix: Array) -> Array:
-    """exp of a small matrix of norm ≪ 1 by its series to fourth order (error ~ |A|⁵/120)."""
-    square = matrix @ matrix
-    return np.eye(len(matrix)) + matrix + square / 2 + square @ matrix / 6 + square @ square / 24
+class _HasTensors(Protocol):
+    @property
+    def tensors(self) -> Array: ...
+
+
+class Tensor:
+    """Attribute that lies in ``tensors[place]`` of its owner; reading gives a frozen copy."""
+
+    def __init__(self, place: int) -> None:
+        self.place = place
+
+    def __get__(self, owner: _HasTensors, kind: type | None = None) -> Array:
+        value = owner.tensors[self.place].copy()
+        value.flags.writeable = False
+        return value
+
+    def __set__(self, owner: _HasTensors, value: Array) -> None:
+        owner.tensors[self.place] = value
 
 
 def shorten_cell(

@@ -7,28 +7,27 @@ the result has the same bits for any number of threads.
 from __future__ import annotations
 
 import os
-import sys
-from concurrent.futures import Future, ThreadPoolExecutor, wait
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import binding
 from numba.core import config
 
-from granufab.errors import InvalidSettings
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.neighbours import morton_order
+from granufab.kernels.pack import pack, solve_packed, unpack
 from granufab.kernels.problem import Problem, State
-from granufab.kernels.slots import Slots, fields, pack, places, schedule, unpack
-from granufab.kernels.solve import CONTROLS, SUMS, Work, solve
+from granufab.kernels.schedule import Plan, schedule
+from granufab.kernels.slots import Slots, fields, places
+from granufab.kernels.solve import CONTROLS, SUMS, Work
 from granufab.kernels.sweep import Law
-from granufab.kernels.team import COUNTERS, GIVE_UP
 from granufab.packing import Array, IntArray
 from granufab.simulate.bodies import aligned
 from granufab.simulate.mending import mend
+from granufab.simulate.team import Team, thread_count
 
-__all__ = ["ContactSolver", "Packed", "Solution", "thread_count", "wide_by_default"]
+__all__ = ["ContactSolver", "Packed", "Solution", "patience_of", "wide_by_default"]
 
 CHUNK_GRAINS, MOST_CHUNKS = 3000, 64
 """Grains for one chunk; from twice as many on the number of chunks is rounded up to ``TEAMS``."""
@@ -58,34 +57,9 @@ class Solution(NamedTuple):
     mends: int = 0
 
 
-def thread_count() -> int:
-    """Threads of a run: GRANUFAB_THREADS, else the processors this process may use.
-
-    Teams wait actively, so the default is 1 where a waiting thread cannot give its processor
-    away (not POSIX) and at most what a container is allowed.
-
-    Raises:
-        InvalidSettings: GRANUFAB_THREADS is not a positive integer.
-    """
-    given = os.environ.get("GRANUFAB_THREADS")
-    if not given:
-        if os.name != "posix":
-            return 1
-        usable = getattr(os, "sched_getaffinity", None)
-        count = len(usable(0)) if usable else os.cpu_count() or 1
-        return max(1, min(count, _quota()))
-    if not given.isdecimal() or int(given) < 1:
-        raise InvalidSettings(f"GRANUFAB_THREADS is {given!r}, must be an integer ≥ 1")
-    return int(given)
-
-
-def _quota() -> int:
-    """Processors that the control group of this process may use, rounded up."""
-    try:
-        allowed, period = Path("/sys/fs/cgroup/cpu.max").read_text().split()
-        return -(-int(allowed) // int(period))
-    except (OSError, ValueError):  # no such file, or no limit ("max")
-        return sys.maxsize
+def patience_of(softness: float, cap: float) -> float:
+    """Sweeps without progress after which to stop; only compliant contacts can be mended."""
+    return PATIENCE if cap > 0 and softness > 0 else np.inf
 
 
 def wide_by_default() -> bool:
@@ -99,11 +73,11 @@ def wide_by_default() -> bool:
 
 
 class Packed(NamedTuple):
-    """A packed problem: contacts, shared law, slot of every contact, numbers of a batch."""
+    """A packed problem: contacts, shared law, where they lie, numbers of a batch."""
 
     slots: Slots
     law: Law
-    order: IntArray
+    plan: Plan
     size: int
 
 
@@ -113,7 +87,7 @@ class ContactSolver:
     Args:
         grain_count: grains; bodies beyond are walls and the spare one.
         dimension: 2 or 3.
-        threads: most threads to use; default :func:`thread_count`.
+        threads: most threads to use; default :func:`granufab.simulate.team.thread_count`.
         wide: update eight contacts at once; default :func:`wide_by_default`.
     """
 
@@ -127,24 +101,28 @@ class ContactSolver:
     ) -> None:
         self.grain_count, self.dimension = grain_count, dimension
         self.like = (0.0,) * dimension
-        self.wanted = 1 if getattr(config, "DISABLE_JIT", 0) else threads or thread_count()
+        self.team = Team(1 if getattr(config, "DISABLE_JIT", 0) else threads or thread_count())
         self.wide = wide_by_default() if wide is None else wide
         self.chunk = np.zeros(grain_count, np.int64)
         teams = -(-(grain_count // CHUNK_GRAINS) // TEAMS)
         self.divide(min(MOST_CHUNKS, TEAMS * teams) if grain_count >= 2 * CHUNK_GRAINS else 1)
-        self._pool: ThreadPoolExecutor | None = None
-        self._process = os.getpid()
-        self._values, self._index = aligned((0,)), np.zeros((2, 0), np.uint32)
+        self._values, self._first, self._second = aligned((0,)), _indices(0), _indices(0)
+        self._plan: Plan | None = None
         self._work: Work | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Everything but memory that is made again when needed."""
+        return {**self.__dict__, "_plan": None, "_work": None}
 
     @property
     def threads(self) -> int:
         """Threads that share a solve: as many as wanted, at most one for each chunk."""
-        return min(self.wanted, self.chunk_count)
+        return min(self.team.most, self.chunk_count)
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but threads and what they share, which are made again when needed."""
-        return {**self.__dict__, "_pool": None, "_work": None}
+    @property
+    def width(self) -> tuple[Any, ...]:
+        """Width and dimension of the sweep, as kernels are told."""
+        return (self.like,) if self.wide else self.like
 
     def arrange(self, position: Array, matrix: Array, origin: Array) -> None:
         """Divide the grains into chunks that lie together."""
@@ -168,18 +146,43 @@ class ContactSolver:
             settings: (tolerance, max_sweeps, momentum cap, floor), see ``kernels.solve``.
         """
         tolerance, most, cap, floor = settings
-        patience = PATIENCE if cap > 0 and problem.softness > 0 else np.inf
+        patience = patience_of(problem.softness, cap)
+        packed = self.pack(problem, state)
         sweeps = mends = 0
         while True:
-            packed = self.pack(problem, state)
             found = self.iterate(packed, state, (tolerance, most - sweeps, cap, floor), patience)
-            unpack(
-                packed.slots, packed.size, packed.order, state.impulse_n, state.impulse_t, self.like
-            )
             sweeps += found.sweeps
             if found.residual <= tolerance or sweeps >= most:
+                unpack(packed.slots, packed.plan, packed.size, state, self.like)
                 return found._replace(sweeps=sweeps, mends=mends)
-            mends += mend(problem, state, self._change(packed), mends)
+            mends += self.mend(problem, state, packed.slots, mends)
+
+    def mend(self, problem: Problem, state: State, slots: Slots, before: int) -> bool:
+        """Solve the contacts that circle together, in the packed contacts and in ``state``.
+
+        Args:
+            problem: contacts of the step, packed in ``slots``.
+            state: velocities that belong to the packed impulses; gets these, too.
+            slots: impulses of the last sweep and of the one before; both then hold the solution.
+            before: groups of this step that were solved already.
+        Returns:
+            Whether anything was done, see :func:`granufab.simulate.mending.mend`.
+        """
+        at, batches = places(self.like), int(slots.starts[-1])
+        size = fields(self.like, problem.coupled)
+        table = slots.values[: batches * size * WIDTH].reshape(batches, size, WIDTH)
+        slot = self.plan(0).order[: len(problem.length)]
+        batch, lane, tangents = slot // WIDTH, slot % WIDTH, state.impulse_t.shape[1]
+        now = [at.impulse_n, *(at.impulse_t + k for k in range(tangents))]
+        last = [at.before_n, *(at.before_t + k for k in range(tangents))]
+        impulse = np.stack([table[batch, field, lane] for field in now], axis=1)
+        change = impulse - np.stack([table[batch, field, lane] for field in last], axis=1)
+        state.impulse_n[:], state.impulse_t[:] = impulse[:, 0], impulse[:, 1:]
+        mended = mend(problem, state, np.linalg.norm(change, axis=1), before)
+        impulse = np.column_stack([state.impulse_n, state.impulse_t])
+        for k in range(tangents + 1):
+            table[batch, now[k], lane] = table[batch, last[k], lane] = impulse[:, k]
+        return mended
 
     def pack(self, problem: Problem, state: State) -> Packed:
         """The contacts in the order of the sweep; valid until the next call."""
@@ -187,26 +190,11 @@ class ContactSolver:
             problem.softness, problem.spin_factor, problem.coupled,
             problem.dilation_weight, problem.weight,
         )  # fmt: skip
-        order = np.empty(len(problem.length), np.int64)
-        starts = schedule(
-            problem.first, problem.second, self.grain_count, self.chunk, self.chunk_count, order
-        )
-        size = fields(self.like, problem.coupled) * WIDTH
-        slots = self._slots(starts, size)
-        pack(problem, state.motion, state.impulse_n, state.impulse_t, order, slots, self.like)
-        return Packed(slots, law, order, size)
-
-    def _change(self, packed: Packed) -> Array:
-        """|ΔP| of every contact in the last sweep [N s]."""
-        at, slots = places(self.like), packed.slots
-        batches = int(slots.starts[-1])
-        table = slots.values[: batches * packed.size].reshape(batches, -1, WIDTH)
-        tangents = 1 if self.dimension == 2 else 3
-        change = table[:, at.impulse_n] - table[:, at.before_n]
-        squared = change**2
-        for k in range(tangents):
-            squared += (table[:, at.impulse_t + k] - table[:, at.before_t + k]) ** 2
-        return np.sqrt(squared).ravel()[packed.order]
+        plan = self.plan(len(problem.length))
+        batches = schedule(plan, problem.first, problem.second)
+        slots = self.slots(batches, coupled=problem.coupled)
+        pack(problem, state, plan, slots, self.like)
+        return Packed(slots, law, plan, fields(self.like, problem.coupled) * WIDTH)
 
     def iterate(
         self,
@@ -219,65 +207,63 @@ class ContactSolver:
 
         Ends also after ``patience`` sweeps without progress.
         """
-        if self._process != os.getpid():  # a fork has none of its parent's threads
-            self._process, self._pool, self._work = os.getpid(), None, None
-        work = self._workspace(state.motion)
+        work = self.work(state.motion)
         work.cells[-1, 0] = state.rate
-        like = (self.like,) if self.wide else self.like
-        common = (
+        arguments = (
             packed.slots,
             state.motion,
             packed.law,
             work,
-            like,
+            self.width,
             packed.size,
             (*settings, patience),
         )
-        run: Any = self._together if self.threads > 1 else solve
-        found = run(*common, 0, self.threads)
+        found = self.together(solve_packed, arguments)
         state.rate[:] = work.cells[-1, 0]
         return Solution(*found)
 
-    def _together(self, *arguments: Any) -> Any:
-        """Solve with all threads; if one fails the others end, and the next solve starts afresh."""
-        *common, first, members = arguments
-        work: Work = common[3]
-        others: list[Future[Any]] = []
-        run: Any = solve
-        try:
-            others += [self._submit(*common, k, members) for k in range(first + 1, members)]
-            found = run(*arguments)
-            for other in others:
-                other.result()
-        except BaseException:
-            work.counters[GIVE_UP] = 1
-            wait(others)
-            self._work = None
-            raise
-        return found
+    def together(self, kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        """Call a kernel for every thread of the solver; see :meth:`Team.run`."""
+        return self.team.run(kernel, arguments, self.threads)
 
-    def _submit(self, *arguments: Any) -> Future[Any]:
-        if self._pool is None:
-            self._pool = ThreadPoolExecutor(self.wanted - 1, thread_name_prefix="granufab")
-        return self._pool.submit(solve, *arguments)
+    def plan(self, contact_count: int) -> Plan:
+        """Memory to arrange at least so many contacts, for the present chunks."""
+        plan, chunks = self._plan, self.chunk_count
+        if plan is None or len(plan.listed) < contact_count or len(plan.heads) != chunks + 2:
+            plan = self._plan = Plan.of(self.chunk, chunks, contact_count * 5 // 4)
+        return plan
 
-    def _slots(self, starts: IntArray, size: int) -> Slots:
-        batches = int(starts[-1])
+    def slots(self, batches: int, *, coupled: bool) -> Slots:
+        """Room for so many batches; the contacts packed before are lost where it grows."""
+        size = fields(self.like, coupled) * WIDTH
         if len(self._values) < batches * size:
             self._values = aligned((batches * size * 5 // 4 + size,))
-        if self._index.shape[1] < batches * WIDTH:
-            self._index = np.zeros((2, batches * WIDTH * 5 // 4 + WIDTH), np.uint32)
-        return Slots(self._values, self._index[0], self._index[1], starts)
+        if len(self._first) < batches * WIDTH:
+            room = batches * WIDTH * 5 // 4 + WIDTH
+            self._first, self._second = _indices(room), _indices(room)
+        return Slots(self._values, self._first, self._second, self.plan(0).starts)
 
-    def _workspace(self, bodies: Array) -> Work:
-        if self._work is None or len(self._work.sums) != self.chunk_count + 1:
-            dimension, chunks = self.dimension, self.chunk_count
-            self._work = Work(
+    def room(self, *, coupled: bool) -> int:
+        """Batches that the slots have room for."""
+        size = fields(self.like, coupled) * WIDTH
+        return min(len(self._values) // size, len(self._first) // WIDTH)
+
+    def work(self, bodies: Array) -> Work:
+        """Memory of the team that solves."""
+        counters = self.team.ready()
+        work, dimension, chunks = self._work, self.dimension, self.chunk_count
+        if work is None or len(work.sums) != chunks + 1 or len(work.before) != len(bodies):
+            work = Work(
                 before=aligned(bodies.shape),
                 cells=np.zeros((chunks + 1, 3, dimension, dimension)),
                 rate_before=np.zeros((dimension, dimension)),
                 sums=np.zeros((chunks + 1, SUMS)),
                 control=np.zeros(CONTROLS),
-                counters=np.zeros(COUNTERS, np.int64),
+                counters=counters,
             )
+        self._work = work._replace(counters=counters)
         return self._work
+
+
+def _indices(count: int) -> np.ndarray:
+    return np.zeros(count, np.uint32)

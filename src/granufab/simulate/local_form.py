@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import sparse
+import scipy  # its parts load where they are used
 
 from granufab.errors import InvalidProblem
 from granufab.kernels.problem import Problem, State
@@ -44,13 +44,13 @@ def local_form(problem: Problem, state: State, *, title: str = "") -> LocalProbl
             "take a smaller sample or a fixed cell"
         )
     impulse = _rows(problem, state.impulse_n, state.impulse_t)
-    W: Any = sparse.csr_array((size, size))
+    W: Any = scipy.sparse.csr_array((size, size))
     q = _rows(problem, problem.offset_n, problem.offset_t)
     for part in parts:
-        W = W + part.B @ sparse.diags_array(part.weight) @ part.B.T
+        W = W + part.B @ scipy.sparse.diags_array(part.weight) @ part.B.T
         q += part.B @ (part.velocity - part.weight * (part.B.T @ impulse))
-    spring = problem.softness * sparse.eye_array(size)
-    W = sparse.csr_array(W + spring)
+    spring = problem.softness * scipy.sparse.eye_array(size)
+    W = scipy.sparse.csr_array(W + spring)
     return LocalProblem(
         W=(W + W.T) / 2,
         q=q,
@@ -91,7 +91,7 @@ def contact_frames(normal: Array) -> Array:
 class _Map(NamedTuple):
     """B, inverse masses and present velocities of one kind of bodies."""
 
-    B: sparse.csr_array
+    B: scipy.sparse.csr_array
     weight: Array
     velocity: Array
 
@@ -148,10 +148,14 @@ def _cell(problem: Problem, rate: Array, frames: Array) -> _Map:
     )
 
 
-def _sparse(entries: Array, rows: IntArray, columns: IntArray, width: int) -> sparse.csr_array:
+def _sparse(
+    entries: Array, rows: IntArray, columns: IntArray, width: int
+) -> scipy.sparse.csr_array:
     size = entries.shape[0] * entries.shape[1]
-    made = sparse.coo_array((entries.ravel(), (rows.ravel(), columns.ravel())), shape=(size, width))
-    return sparse.csr_array(made)
+    made = scipy.sparse.coo_array(
+        (entries.ravel(), (rows.ravel(), columns.ravel())), shape=(size, width)
+    )
+    return scipy.sparse.csr_array(made)
 
 
 def _rows(problem: Problem, normal: Array, tangent: Array) -> Array:

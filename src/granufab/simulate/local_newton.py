@@ -13,8 +13,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import splu
+import scipy  # its parts load where they are used
 
 from granufab.packing import Array
 from granufab.simulate.local_residual import ScaledProblem
@@ -77,12 +76,12 @@ def _search(problem: ScaledProblem, impulse: Array, law: _Law, change: Array) ->
 def _direction(problem: ScaledProblem, law: _Law, epsilon: float) -> Array | None:
     """−J⁻¹F, or None where J has no factors."""
     count, d = law.defect.shape
-    one = sparse.eye_array(count * d, format="csr")
+    one = scipy.sparse.eye_array(count * d, format="csr")
     order = (law.derivative, np.arange(count), np.arange(count + 1))
-    D = sparse.bsr_array(order, shape=one.shape)
+    D = scipy.sparse.bsr_array(order, shape=one.shape)
     J = one - D + D @ (problem.W + epsilon * one)
     try:
-        change = -splu(sparse.csc_array(J)).solve(law.defect.ravel())
+        change = -scipy.sparse.linalg.splu(scipy.sparse.csc_array(J)).solve(law.defect.ravel())
     except RuntimeError:
         return None
     return change.reshape(count, d) if np.isfinite(change).all() else None

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple, Self
 
 import numpy as np
+import scipy  # its parts load where they are used
 from numpy.typing import NDArray
-from scipy import sparse
 
 from granufab.errors import InvalidProblem
 from granufab.local_problem import LocalProblem
@@ -34,7 +34,7 @@ class ScaledProblem(NamedTuple):
         weight: velocity/max|q| of a scaled velocity of 1, shape (contact_count,).
     """
 
-    W: sparse.bsr_array
+    W: scipy.sparse.bsr_array
     q: Array
     mu: Array
     mobile: NDArray[np.bool_]
@@ -68,12 +68,12 @@ class ScaledProblem(NamedTuple):
         root = 1 / np.sqrt(diagonal[mobile].mean(axis=1))
         largest = float(np.abs(problem.q).max(initial=0.0)) or 1.0
         rows = np.repeat(mobile, d)
-        scale = sparse.diags_array(np.repeat(root, d))
+        scale = scipy.sparse.diags_array(np.repeat(root, d))
         W = scale @ problem.W[rows][:, rows] @ scale
-        W = sparse.csr_array((W + W.T) / 2)
+        W = scipy.sparse.csr_array((W + W.T) / 2)
         level = float(np.linalg.norm(q[mobile] * root[:, None] / largest)) or 1.0
         return cls(
-            W=sparse.bsr_array(W, blocksize=(d, d)),
+            W=scipy.sparse.bsr_array(W, blocksize=(d, d)),
             q=q[mobile] * root[:, None] / (largest * level),
             mu=problem.mu[mobile],
             mobile=mobile,

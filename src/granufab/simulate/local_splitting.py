@@ -13,8 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import splu
+import scipy  # its parts load where they are used
 
 from granufab.packing import Array
 from granufab.simulate.local_residual import ScaledProblem, project_on_cone
@@ -78,7 +77,9 @@ def _balance(primal: np.floating, dual: np.floating) -> float:
 
 
 def _factors(problem: ScaledProblem, rho: float) -> Callable[[Array], Array]:
-    shifted: Any = sparse.csc_array(problem.W + rho * sparse.eye_array(problem.W.shape[0]))
-    return splu(
+    shifted: Any = scipy.sparse.csc_array(
+        problem.W + rho * scipy.sparse.eye_array(problem.W.shape[0])
+    )
+    return scipy.sparse.linalg.splu(
         shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
     ).solve

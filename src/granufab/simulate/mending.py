@@ -69,7 +69,7 @@ def mend(problem: Problem, state: State, change: Array, before: int = 0) -> bool
     turn = State(
         state.motion, state.rate, impulse_n - start.impulse_n, impulse_t - start.impulse_t
     )  # fmt: skip
-    apply_impulses(group, turn, (0.0,) * problem.normal.shape[1])
+    apply_impulses(group, turn, np.arange(len(chosen)), (0.0,) * problem.normal.shape[1])
     state.impulse_n[chosen], state.impulse_t[chosen] = impulse_n, impulse_t
     return True
 

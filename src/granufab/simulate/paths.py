@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from granufab.errors import InvalidSettings
 from granufab.history import Frame, Recorder, Run, StepStatistics, series_dataset
 from granufab.packing import Array, Packing
@@ -15,7 +17,7 @@ from granufab.simulate.loading import Loading, loading_of_stage
 from granufab.simulate.preparation import Prepared, prepare
 from granufab.simulate.scales import Scales
 from granufab.simulate.settings import Case, Material, Record, Sample, Solver, Stage
-from granufab.simulate.stepping import Simulation
+from granufab.simulate.stepping import Simulation, Watch
 from granufab.simulate.summary import summarise
 
 __all__ = ["Step", "run", "run_case", "shear"]
@@ -23,6 +25,8 @@ __all__ = ["Step", "run", "run_case", "shear"]
 Progress = Callable[[str, float], None]
 REST_ENERGY = 1e-8
 SECONDS_BETWEEN_NEWS = 0.3
+MANY = 10_000
+EARLY, LATE, SLACK = 1 + 1e-9, 1e-12, 1e-13
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -104,17 +108,17 @@ class _Follower:
             self._relax()
             return
         simulation.step_size_limit(step.strain, rate)
-        goal = abs(step.strain)
+        goal = abs(step.strain) * (1 - 1e-9)
         walked = 0.0
-        while walked < goal * (1 - 1e-9):
-            walked += self._advance()
-            self._record(last=walked >= goal * (1 - 1e-9))
+        while walked < goal:
+            walked += self._advance(MANY, goal - walked)
+            self._record(last=walked >= goal)
             self._tell(f"stage {index + 1}: strain", (done + walked) / total)
 
     def _relax(self, limit: int = 3000) -> None:
         self.simulation.damping = 0.5
         for _ in range(limit):
-            self._advance()
+            self._advance(1, np.inf)
             if self.simulation.kinetic_ratio() < REST_ENERGY:
                 break
         else:
@@ -122,21 +126,31 @@ class _Follower:
         self.simulation.damping = 0.0
         self._record(last=True)
 
-    def _advance(self) -> float:
-        """One step; returns the strain walked in the sense of the stage's own loading."""
-        simulation = self.simulation
-        before = simulation.strain.copy()
-        report = simulation.step()
-        change = simulation.strain - before
-        self.place["eps_q"] += _shear_of(change, self.place["direction"], self.place["extension"])
-        own = simulation.loading
-        walked = _shear_of(change, own.direction, own.extension)
-        self.place["eps_q_total"] += abs(walked)
-        self.tally.add(report, simulation.stress_error())
-        return walked if own.deviatoric_rate >= 0 else -walked
+    def _advance(self, steps: int, goal: float) -> float:
+        """Steps up to the next record, or until ``goal`` is walked.
+
+        Returns:
+            The strain walked in the sense of the stage's own loading.
+        """
+        simulation, place = self.simulation, self.place
+        own, before = simulation.loading, simulation.strain
+        sense = 1.0 if own.deviatoric_rate >= 0 else -1.0
+        weight = np.outer(own.direction, own.direction) - np.outer(own.extension, own.extension)
+        due = (min(self.next_row, self.next_frame) - LATE) / EARLY - place["eps_q_total"]
+        watch = Watch(sense * weight, goal - SLACK, due - SLACK)
+        reports = simulation.advance(steps, watch)
+        changes = np.diff(reports.strain, axis=0, prepend=before[None])
+        walked = 0.0
+        for change in changes:
+            place["eps_q"] += _shear_of(change, place["direction"], place["extension"])
+            shear = _shear_of(change, own.direction, own.extension)
+            place["eps_q_total"] += abs(shear)
+            walked += sense * shear
+        self.tally.add(reports)
+        return walked
 
     def _record(self, *, last: bool) -> None:
-        total = self.place["eps_q_total"] * (1 + 1e-9) + 1e-12
+        total = self.place["eps_q_total"] * EARLY + LATE
         if total >= self.next_row or last:
             self.write_row()
             self.next_row = total + self.settings.series_interval * (1 - 1e-6)

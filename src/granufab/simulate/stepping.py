@@ -1,44 +1,83 @@
-"""One Contact Dynamics step, as a list of named stages on a private mutable workspace.
+"""A running system: grains, cell, candidate contacts, loading, and the call that steps them on.
 
-Moreau–Jean midpoint: half drift, contacts and normals there, v_free, solve, half drift. The cell
-is one more body in the solve, so stress-driven components need no controller.
+A step itself is compiled (:mod:`granufab.kernels.step`): Moreau–Jean midpoint. The cell is one
+more body in the solve, so stress-driven components need no controller.
 """
 
 from __future__ import annotations
 
+import os
 import time
+from typing import NamedTuple
 
 import numpy as np
 
-from granufab.errors import InvalidPacking, InvalidSettings, NotConverged
-from granufab.kernels.impulses import apply_impulses
-from granufab.kernels.motion import (
-    accumulate_drift,
-    drift,
-    find_missed,
-    kinetic_energy,
-    virial,
-)
+from granufab.errors import InvalidSettings
+from granufab.kernels.lanes import WIDTH
+from granufab.kernels.motion import kinetic_energy
 from granufab.kernels.problem import Problem, State
-from granufab.kernels.select import select_active
-from granufab.packing import Array, IntArray, Packing, require
-from granufab.simulate.assembly import Buffers, StepLaw, assemble, impulses
+from granufab.kernels.step import Step, advance
+from granufab.kernels.step_arrays import (
+    BATCHES,
+    DRIFT,
+    EXTERNAL,
+    FARTHEST,
+    FREE,
+    IMPOSED,
+    MADE,
+    MATRIX,
+    MEND,
+    MENDS,
+    PATIENCE,
+    PHASE,
+    RATE,
+    ROOM,
+    ROWS,
+    SEARCH,
+    STATUS,
+    STOP,
+    STRAIN,
+    STRAIN_WALKED,
+    STRESS,
+    TIME,
+    TOTAL,
+    TOTAL_GOAL,
+    WALK_GOAL,
+    WALKED,
+    WATCH,
+    StepLaw,
+)
+from granufab.packing import Array, Packing, require
 from granufab.simulate.bodies import body_records
 from granufab.simulate.candidates import Candidates
-from granufab.simulate.cell_motion import matrix_exponential, shorten_cell
-from granufab.simulate.contact_solver import ContactSolver, Solution
+from granufab.simulate.cell_motion import Tensor, shorten_cell
+from granufab.simulate.contact_solver import ContactSolver
 from granufab.simulate.loading import Loading
 from granufab.simulate.scales import Scales
 from granufab.simulate.settings import Material, Solver
-from granufab.simulate.step_report import StepReport
+from granufab.simulate.step_checks import check_step
+from granufab.simulate.step_law import problem_law, skin_of, solve_settings, step_law
+from granufab.simulate.step_memory import StageClock, StepMemory
+from granufab.simulate.step_report import StepReport, StepReports
 
-__all__ = ["Simulation"]
+__all__ = ["Simulation", "Watch"]
 
-MOMENTUM_CAP = 0.9
-ACTIVE_MARGIN = 2e-3
-MISSED_TOLERANCE = 1e-6
-RESOLVES = 3
-OVERLAP_LIMIT = 0.5
+SECONDS_OF_A_CALL = 0.2
+FEWEST_BATCHES = 16
+
+
+class Watch(NamedTuple):
+    """When :meth:`Simulation.advance` is to return: a strain W : ε has been walked.
+
+    Attributes:
+        weight: W, symmetric, shape (D, D).
+        walked: Σ W : Δε to reach [-].
+        total: Σ |W : Δε| to reach [-].
+    """
+
+    weight: Array
+    walked: float
+    total: float
 
 
 class Simulation:
@@ -82,38 +121,71 @@ class Simulation:
         self.solid_volume = float(ball.sum())
         self.position = grains.position.copy()
         self.number = grains.number
-        self.matrix, self.origin = cell.matrix.copy(), np.array(cell.origin)
         self.periodic = np.array(cell.periodic)
-        self.rate = np.array(cell.rate)
         self.time = packing.time or 0.0
-        self.strain = np.zeros((self.dimension, self.dimension))
         self.remap = np.eye(self.dimension, dtype=np.int64)
-        self.gravity = np.zeros(self.dimension) if gravity is None else np.asarray(gravity, float)
-        if self.gravity.shape != (self.dimension,):
-            raise InvalidSettings(
-                f"gravity has shape {self.gravity.shape}, expected {(self.dimension,)}"
-            )
         self.rotation = rotation
         self.rate_cap, self.damping = rate_cap, damping
         self.like = (0.0,) * self.dimension
         self.spin_factor = (2.0 if self.dimension == 2 else 2.5) if rotation else 0.0
         self.motion = body_records(packing)
-        self.free_motion = self.motion.copy()
         self.contact_solver = ContactSolver(self.grain_count, self.dimension)
-        self.walked = np.zeros((self.grain_count, self.dimension))
-        self.strain_walked = 0.0
+        self.memory = StepMemory(
+            self.motion, self.position, self.radius, chunk_count=self.contact_solver.chunk_count,
+            members=self.contact_solver.team.most,
+        )  # fmt: skip
+        self.tensors = self.memory.tensors
+        self.matrix, self.rate, self.origin = map(np.array, (cell.matrix, cell.rate, cell.origin))
+        self.gravity = np.zeros(self.dimension) if gravity is None else np.asarray(gravity, float)
         self.candidates = Candidates(self.grain_count, self.dimension)
-        self.stress = np.zeros((self.dimension, self.dimension))
         self.step_size = 0.0
         self.contact_updates = 0
         self.searches = 0
-        self.seconds = {"search": 0.0, "geometry": 0.0, "solve": 0.0, "rest": 0.0}
+        self._clock = StageClock()
         self.set_loading(loading, step=step)
         self.search()
         self.measure_gaps()
         self.candidates.seed_impulses(
             packing.contacts, packing.wall_contacts, self.step_size, self.remap
         )
+
+    matrix, rate = Tensor(MATRIX), Tensor(RATE)
+    strain, stress = Tensor(STRAIN), Tensor(STRESS)
+
+    @property
+    def origin(self) -> Array:
+        """Corner of the cell [m], shape (D,)."""
+        return self.memory.origin.copy()
+
+    @origin.setter
+    def origin(self, value: Array) -> None:
+        self.memory.origin[:] = value
+
+    @property
+    def gravity(self) -> Array:
+        """Acceleration [m/s²], shape (D,)."""
+        return self.memory.gravity.copy()
+
+    @gravity.setter
+    def gravity(self, value: Array) -> None:
+        if value.shape != (self.dimension,):
+            raise InvalidSettings(f"gravity has shape {value.shape}, expected {(self.dimension,)}")
+        self.memory.gravity[:] = value
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """Wall time so far by stage: search, geometry, assembly, sweeps, rest [s]."""
+        return self._clock.seconds
+
+    @property
+    def problem(self) -> Problem:
+        """Contact problem of the last step; valid until the next one."""
+        return self.memory.problem(problem_law(self), self.memory.contact_count)
+
+    @property
+    def state(self) -> State:
+        """Solution of the last step; valid until the next one."""
+        return self.memory.state(self.memory.contact_count)
 
     def set_loading(self, loading: Loading, *, step: float | None = None) -> None:
         """Change what drives the cell; impulses are rescaled to the new time step.
@@ -140,6 +212,9 @@ class Simulation:
         self.dilation_weight = 1 / (self.dimension * inertia) if loading.dilation else 0.0
         self.weight = loading.free.astype(float) / inertia
         self.coupled = bool(loading.free.any())
+        self.tensors[IMPOSED] = loading.rate
+        self.tensors[EXTERNAL] = loading.stress
+        self.tensors[FREE] = loading.free
 
     def _free_part(self, rate: Array, loading: Loading) -> Array:
         if loading.dilation:
@@ -163,12 +238,16 @@ class Simulation:
 
     def stress_error(self) -> float:
         """Worst |σ − σ_ext| / p on the stress-driven components at the last solve [-]."""
-        difference = self.stress - self.loading.stress
+        return float(self._stress_errors(self.stress[None])[0])
+
+    def _stress_errors(self, stress: Array) -> Array:
+        difference = stress - self.loading.stress
         if self.loading.dilation:
-            return abs(float(np.trace(difference))) / self.dimension / self.scales.pressure
+            trace = np.trace(difference, axis1=1, axis2=2)
+            return np.abs(trace) / self.dimension / self.scales.pressure
         if self.coupled:
-            return float(np.abs(difference[self.loading.free]).max()) / self.scales.pressure
-        return 0.0
+            return np.abs(difference[:, self.loading.free]).max(axis=1) / self.scales.pressure
+        return np.zeros(len(stress))
 
     def remove_drift(self) -> None:
         """Take the centre of mass's velocity out of a fully periodic system."""
@@ -179,7 +258,7 @@ class Simulation:
     def stop(self) -> None:
         """End every motion: of the grains, their spins, and the cell."""
         self.motion[:, : self.dimension + self.candidates.tangents] = 0.0
-        self.rate = np.zeros_like(self.rate)
+        self.tensors[RATE] = 0.0
 
     def step(self) -> StepReport:
         """Advance by ``step_size``.
@@ -188,205 +267,127 @@ class Simulation:
             InvalidPacking: a state is not finite or grains overlap beyond the limit.
             NotConverged: the residual was not met and the solver is ``strict``.
         """
-        clock = time.perf_counter()
-        rate_before = self.rate.copy()
-        self._half_drift()
-        if self._needs_search():
-            self.search()
-        clock = self._tick("search", clock)
-        self.measure_gaps()
-        self._select()
-        self._free_velocities(rate_before)
-        clock = self._tick("geometry", clock)
-        report = self.last_report = self._solve(rate_before)
-        clock = self._tick("solve", clock)
-        self._finish()
-        self._check(report)
-        self._tick("rest", clock)
-        return report
+        return self.advance(1).last
 
-    def _tick(self, name: str, since: float) -> float:
-        now = time.perf_counter()
-        self.seconds[name] += now - since
-        return now
+    def advance(self, steps: int, watch: Watch | None = None) -> StepReports:
+        """Make steps, the same as so many calls of :meth:`step`.
 
-    def _half_drift(self) -> None:
-        half = 0.5 * self.step_size
-        affine = matrix_exponential(half * self.rate)
-        drift(self.position, self.motion, affine, half)
-        self.matrix = affine @ self.matrix
-        self.origin = affine @ self.origin
-        self.strain -= half * 0.5 * (self.rate + self.rate.T)
-        self.strain_walked += half * float(np.linalg.norm(self.rate))
-        self._farthest = accumulate_drift(self.walked, self.motion, half)
+        Args:
+            steps: how many at most, ≥ 1.
+            watch: return after the step with which a goal is reached.
+        Returns:
+            Reports of the steps made: fewer than ``steps`` where a goal was reached, and after
+            some tenths of a second, so that a caller can tell about progress.
+        Raises:
+            InvalidPacking, NotConverged: as :meth:`step`; the last step is then the faulty one.
+        """
+        control = self.memory.notes.control
+        self._set_watch(watch)
+        began, rows, made = time.perf_counter(), [], 0
+        law = step_law(self)
+        while True:
+            self._call(law, min(steps - made, ROWS if os.name == "posix" else 1))
+            fresh = int(control[MADE])
+            rows.append(self.memory.notes.rows[:fresh].copy())
+            made += fresh
+            if control[STATUS] == SEARCH:
+                self.search()
+            elif control[STATUS] == ROOM:
+                self.contact_solver.slots(int(control[BATCHES]), coupled=self.coupled)
+            elif control[STATUS] == MEND:
+                self._mend()
+            elif (
+                made == steps
+                or control[STATUS] == STOP
+                or time.perf_counter() - began > SECONDS_OF_A_CALL
+            ):
+                break
+        reports = StepReports.of_rows(
+            rows[0] if len(rows) == 1 else np.concatenate(rows),
+            (self.dimension, self.dimension),
+            violation_unit=self.scales.diameter / self.step_size,
+            diameter=self.scales.diameter,
+            tolerance=self.solver.tolerance,
+            stress_error=self._stress_errors,
+        )
+        self.time = float(control[TIME])
+        self.contact_updates += int(reports.contact_updates.sum())
+        self.last_report = reports.last
+        if control[STATUS] == STOP:
+            check_step(self, self.last_report)
+        return reports
 
-    def _needs_search(self) -> bool:
-        reach = 2 * float(self.radius.max()) + self._skin
-        return 2 * self._farthest + self.strain_walked * reach > self._skin - self._margin
+    def _mend(self) -> None:
+        """Solve together the contacts round which the sweeps circle."""
+        began = time.perf_counter()
+        control, solver = self.memory.notes.control, self.contact_solver
+        slots = solver.slots(0, coupled=self.coupled)
+        control[MENDS] += solver.mend(self.problem, self.state, slots, int(control[MENDS]))
+        self._clock.seconds["sweeps"] += time.perf_counter() - began
 
-    @property
-    def _skin(self) -> float:
-        return self.solver.skin * self.scales.diameter
+    def _set_watch(self, watch: Watch | None) -> None:
+        control = self.memory.notes.control
+        control[TIME], control[WALKED], control[TOTAL] = self.time, 0.0, 0.0
+        control[WALK_GOAL], control[TOTAL_GOAL] = np.inf, np.inf
+        self.tensors[WATCH] = 0.0
+        if watch is not None:
+            self.tensors[WATCH] = watch.weight
+            control[WALK_GOAL], control[TOTAL_GOAL] = watch.walked, watch.total
 
-    @property
-    def _margin(self) -> float:
-        return ACTIVE_MARGIN * self.scales.diameter
+    def _call(self, law: StepLaw, steps: int) -> None:
+        """One call of the kernel."""
+        since = time.perf_counter()
+        memory, solver = self.memory, self.contact_solver
+        memory.notes.clock[PATIENCE] = int(1e9 * SECONDS_OF_A_CALL)
+        step = Step(
+            bodies=memory.bodies(),
+            box=memory.box(),
+            pairs=self.candidates.arrays(),
+            problem=memory.problem(problem_law(self)),
+            state=memory.state(),
+            plan=solver.plan(self.candidates.count),
+            slots=solver.slots(0, coupled=self.coupled),
+            work=solver.work(self.motion),
+            notes=memory.notes,
+        )
+        arguments = (step, law, solve_settings(self), self.like, solver.width, steps)
+        try:
+            solver.together(advance, arguments)
+        except BaseException:
+            memory.notes.control[PHASE] = DRIFT
+            raise
+        self._clock.add(memory.notes.clock, since)
 
     def search(self) -> None:
         """Find the candidate pairs afresh; gaps are measured separately."""
-        shorten_cell(self.matrix, self.periodic, self.remap, self.candidates.shear_images)
-        cell = (self.matrix, self.origin, self.periodic)
+        began = time.perf_counter()
+        matrix, origin = self.tensors[MATRIX], self.memory.origin
+        shorten_cell(matrix, self.periodic, self.remap, self.candidates.shear_images)
         friction = (self.material.friction, self.material.wall_friction)
-        self.candidates.search(self.position, self.radius, cell, self._skin, friction)
-        self.contact_solver.arrange(self.position, self.matrix, self.origin)
-        self.walked[:] = 0.0
-        self.strain_walked = 0.0
-        self._farthest = 0.0
+        solver = self.contact_solver
+        self.candidates.search(
+            self.position, self.radius, (matrix, origin, self.periodic), skin_of(self), friction,
+            solver.together,
+        )  # fmt: skip
+        solver.arrange(self.position, matrix, origin)
+        self.candidates.divide(solver.chunk, solver.chunk_count)
+        count = self.candidates.count
+        self.memory.reserve(count)
+        solver.slots(count // WIDTH + FEWEST_BATCHES, coupled=self.coupled)
+        self.memory.walked[:] = 0.0
+        control = self.memory.notes.control
+        control[STRAIN_WALKED], control[FARTHEST] = 0.0, 0.0
         self.searches += 1
-        self._buffers = Buffers.of(self.candidates.count, self.dimension)
+        self._clock.seconds["search"] += time.perf_counter() - began
 
     def measure_gaps(self) -> None:
-        """Normals, lengths and gaps of the candidates at the present positions."""
-        self.candidates.measure(self.position, self.radius, self.matrix, self.origin, self.like)
-
-    def _select(self) -> None:
-        touching = 1e-10 * self.scales.diameter
-        margin = -1.0 if self.material.restitution > 0 else self._margin
-        limits = (margin, self.step_size, float(np.linalg.norm(self.rate)), touching)
-        c = self.candidates
-        select_active(c.pairs, c.gap, c.impulse_n, self.motion, limits, c.active, self.like)
-
-    def _free_velocities(self, rate_before: Array) -> None:
-        self.free_motion[:] = self.motion
-        rows = self.free_motion[: self.grain_count, : self.dimension]
-        rows += self.step_size * self.gravity
-        if self.damping:
-            self.free_motion[: self.grain_count, : -1 if self.dimension == 2 else -2] *= (
-                1 - self.damping
-            )
-        free = self._free_part(rate_before - self.loading.rate, self.loading)
-        free = free * (1 - self.damping)
-        push = self.step_size * self.volume / self.cell_inertia
-        if self.loading.dilation:
-            pressure = np.trace(self.loading.stress) / self.dimension
-            free = free - np.eye(self.dimension) * (push * pressure)
-        else:
-            free = free - np.where(self.loading.free, push * self.loading.stress, 0.0)
-        self.free_rate = free
+        """Normals, lengths and gaps of the candidates; impulses turn with the normals."""
+        self._call(step_law(self), 0)
 
     @property
     def volume(self) -> float:
         """Cell volume now [m^D]."""
         return float(np.linalg.det(self.matrix))
-
-    def _solve(self, rate_before: Array) -> StepReport:
-        """Solve, and again while a pair left out of the solve would overlap by its end."""
-        sweeps, resolves = 0, 0
-        law = self._law()
-        self.candidates.remember_tangents()
-        while True:
-            problem, chosen = assemble(
-                self.candidates, self._buffers, law, (self._start_motion(), rate_before), self.like
-            )
-            found = self._iterate(problem)
-            sweeps += found.sweeps
-            self.contact_updates += found.sweeps * len(chosen)
-            self._store(problem, chosen)
-            if self.material.restitution > 0 or resolves == RESOLVES or not self._missed():
-                break
-            resolves += 1
-        overlap = max(0.0, -float(self.candidates.gap.min(initial=0.0))) / self.scales.diameter
-        return StepReport(
-            sweeps=sweeps,
-            residual=found.residual,
-            residual_contact=found.residual_contact,
-            violation=found.violation * self.step_size / self.scales.diameter,
-            overlap=overlap,
-            converged=found.residual <= self.solver.tolerance,
-            contacts=len(chosen),
-            resolves=resolves,
-        )
-
-    def _missed(self) -> int:
-        c = self.candidates
-        tolerance = MISSED_TOLERANCE * self.scales.diameter
-        return find_missed(
-            c.pairs, c.normal, c.length, c.gap, c.active,
-            self.motion, self.rate, self.step_size, tolerance, self.like,
-        )  # fmt: skip
-
-    def _law(self) -> StepLaw:
-        stiffness = self.solver.stiffness * self.scales.force / self.scales.diameter
-        soft = np.isfinite(stiffness) and self.material.restitution == 0
-        return StepLaw(
-            step=self.step_size,
-            softness=1 / (stiffness * self.step_size**2) if soft else 0.0,
-            overlap_correction=self.solver.overlap_correction,
-            restitution=self.material.restitution,
-            spin_factor=self.spin_factor,
-            coupled=self.coupled,
-            dilation_weight=self.dilation_weight,
-            weight=self.weight,
-            imposed=self.loading.rate,
-        )
-
-    def _start_motion(self) -> Array:
-        """Motion at the start of the step: free velocities before gravity acted."""
-        if not self.gravity.any():
-            return self.free_motion
-        start = self.free_motion.copy()
-        start[: self.grain_count, : self.dimension] -= self.step_size * self.gravity
-        return start
-
-    def _iterate(self, problem: Problem) -> Solution:
-        impulse_n, impulse_t = impulses(self._buffers, len(problem.length))
-        self.motion[:] = self.free_motion
-        state = State(self.motion, self.free_rate.copy(), impulse_n, impulse_t)
-        apply_impulses(problem, state, self.like)
-        cap = MOMENTUM_CAP if self.solver.momentum else 0.0
-        floor = self.scales.force * self.step_size
-        settings = (self.solver.tolerance, self.solver.max_sweeps, cap, floor)
-        return self.contact_solver.solve(problem, state, settings)
-
-    def _store(self, problem: Problem, chosen: IntArray) -> None:
-        """Velocities afresh from the impulses (no drift of round-off), impulses to the list."""
-        impulse_n, impulse_t = impulses(self._buffers, len(chosen))
-        self.motion[:] = self.free_motion
-        self.problem = problem
-        self.state = State(self.motion, self.free_rate.copy(), impulse_n, impulse_t)
-        apply_impulses(problem, self.state, self.like)
-        self.rate = self.loading.rate + self.state.rate
-        self.candidates.keep_impulses(chosen, impulse_n, impulse_t)
-
-    def _finish(self) -> None:
-        push = virial(self.problem, self.state.impulse_n, self.state.impulse_t, self.like)
-        self.stress = push / (self.step_size * self.volume)
-        if self.rate_cap is not None:
-            free = self.rate - self.loading.rate
-            largest = float(np.abs(free).max())
-            if largest > self.rate_cap:
-                self.rate = self.loading.rate + free * (self.rate_cap / largest)
-        self._half_drift()
-        self.time += self.step_size
-
-    def _check(self, report: StepReport) -> None:
-        if not np.isfinite(self.motion).all() or not np.isfinite(self.rate).all():
-            bad = np.flatnonzero(~np.isfinite(self.motion).all(axis=1))[:3]
-            raise InvalidPacking(
-                f"the velocity of grains {bad.tolist()} is not finite after a step"
-            )
-        if report.overlap > OVERLAP_LIMIT:
-            worst = int(np.argmin(self.candidates.gap))
-            i, j = self.candidates.pairs[worst]
-            raise InvalidPacking(
-                f"grains {i} and {j} overlap by {report.overlap:.2g} diameters, limit "
-                f"{OVERLAP_LIMIT}; take a smaller time_step"
-            )
-        if not report.converged and self.solver.strict:
-            raise NotConverged(
-                f"a step ended at residual {report.residual:.2e} after {report.sweeps} sweeps, "
-                f"tolerance {self.solver.tolerance:.1e}; raise solver.max_sweeps or lower stiffness"
-            )
 
     def kinetic_ratio(self) -> float:
         """Kinetic energy of the fluctuations / (p V) [-]."""
