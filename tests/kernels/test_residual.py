@@ -17,8 +17,7 @@ BODIES, CONTACTS = 12, 20
 def solve(problem, state, tolerance, max_sweeps, cap=0.0, *, floor=1e-3, wide=False, chunks=1):
     """Sweeps, residual, largest share, worst violation of a solve in place."""
     solver = ContactSolver(BODIES, problem.normal.shape[1], wide=wide)
-    solver.chunk_count = chunks
-    solver.chunk[:] = np.arange(BODIES) % chunks
+    solver.divide(chunks, np.argsort(np.arange(BODIES) % chunks, kind="stable"))
     return solver.solve(problem, state, (tolerance, max_sweeps, cap, floor))[:4]
 
 

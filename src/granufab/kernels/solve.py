@@ -22,7 +22,7 @@ import numpy as np
 
 from granufab.kernels.access import address, item, set_item
 from granufab.kernels.cell import move_cell
-from granufab.kernels.options import inlined, part
+from granufab.kernels.options import part
 from granufab.kernels.slots import Slots
 from granufab.kernels.sweep import Law, defects, sweep
 from granufab.kernels.team import given_up, meet
@@ -43,6 +43,7 @@ class Work(NamedTuple):
     """Memory of a solve, shared by a team.
 
     Attributes:
+        grains: indices of the grains, chunk after chunk, shape (N,).
         before: body velocities of the iterate before, shape of ``bodies``.
         cells: (free rates, push, scratch) of the cell as each chunk sees it, and last for all,
             shape (chunk_count + 1, 3, D, D).
@@ -52,6 +53,7 @@ class Work(NamedTuple):
         counters: of the barrier, shape (COUNTERS,).
     """
 
+    grains: np.ndarray
     before: np.ndarray
     cells: np.ndarray
     rate_before: np.ndarray
@@ -86,8 +88,6 @@ def solve(slots: Slots, bodies, law: Law, work: Work, like, size, settings, memb
     state = (settings[2], settings[2], 0, 0, np.inf)
     watch = (0, np.inf, 0, 1.0, np.inf, 0.0)
     while control[DONE] == 0.0 and (members == 1 or not given_up(work.counters)):
-        _extrapolate(bodies, work, control[BETA], member, members)
-        meet(work.counters, members)
         _sweep_all(slots, bodies, law, work, like, size, member, members)
         if member == 0:
             state, watch = _decide(work, settings, state, watch)
@@ -127,56 +127,71 @@ def _remember(bodies, work: Work, member, members):
             work.before[i, k] = bodies[i, k]
 
 
-@inlined
-def _extrapolate_line(now, before, start, end, beta):
-    for k in range(start, end):
-        value = item(now, k)
-        set_item(now, k, value + beta * (value - item(before, k)))
-        set_item(before, k, value)
+@part
+def _extrapolate(bodies, work: Work, chunk, chunks, beta):
+    """now ← now + β (now − before), before ← now, for the grains of a chunk; walls never change."""
+    count, width = len(work.grains), bodies.shape[1]
+    now, before, grains = address(bodies), address(work.before), address(work.grains)
+    for turn in range(_first_of(chunk, chunks, count), _first_of(chunk + 1, chunks, count)):
+        row = item(grains, turn) * width
+        for k in range(row, row + width):
+            value = item(now, k)
+            set_item(now, k, value + beta * (value - item(before, k)))
+            set_item(before, k, value)
 
 
 @part
-def _extrapolate(bodies, work: Work, beta, member, members):
-    """now ← now + β (now − before), before ← now, for this member's bodies (first: the cell)."""
-    first, end = _rows(len(bodies), member, members)
-    width = bodies.shape[1]
-    _extrapolate_line(address(bodies), address(work.before), first * width, end * width, beta)
-    if member == 0:
-        rate = work.cells[-1, 0]
-        for k in range(len(rate)):
-            for l in range(len(rate)):
-                value = rate[k, l]
-                rate[k, l] = value + beta * (value - work.rate_before[k, l])
-                work.rate_before[k, l] = value
+def _first_of(chunk, chunks, count):
+    """Place of the first grain of a chunk among the grains in the order of the chunks."""
+    return (chunk * count + chunks - 1) // chunks
 
 
 @part
-def _start_cell(cell, shared):
-    """The cell as a chunk sees it before its first contact: the shared rates, no push."""
+def _start_cell(cell, work: Work, beta):
+    """The extrapolated cell as a chunk sees it before its first contact: no push yet."""
+    shared = work.cells[-1]
     for k in range(cell.shape[1]):
         for l in range(cell.shape[1]):
-            cell[0, k, l], cell[1, k, l], cell[2, k, l] = shared[0, k, l], 0.0, 0.0
+            value = shared[0, k, l]
+            cell[0, k, l] = value + beta * (value - work.rate_before[k, l])
+            cell[1, k, l], cell[2, k, l] = 0.0, 0.0
 
 
 @part
 def _sweep_all(slots: Slots, bodies, law: Law, work: Work, like, size, member, members):
-    """One sweep over all chunks, then over the contacts between them."""
+    """Extrapolate and sweep chunk by chunk, then sweep the contacts between them.
+
+    A chunk's own contacts touch none but its own grains (and walls), so what is extrapolated is
+    still in the cache when it is swept.
+    """
     chunks = len(slots.starts) - 2
     beta, cells = work.control[BETA], work.cells
     for chunk in range(member, chunks, members):
-        _start_cell(cells[chunk], cells[-1])
+        _extrapolate(bodies, work, chunk, chunks, beta)
+        _start_cell(cells[chunk], work, beta)
         reach = (slots.starts[chunk], slots.starts[chunk + 1], beta, float(chunks))
         moved, length2 = sweep(slots, bodies, law, reach, cells[chunk], like, size)
         work.sums[chunk, 0], work.sums[chunk, 1] = moved, length2
     meet(work.counters, members)
     if member == 0:
         shared = cells[-1]
+        _turn_cell(shared, work, beta)
         for chunk in range(chunks):
             move_cell(shared[0], cells[chunk, 1])
-        _start_cell(shared, shared)
         reach = (slots.starts[chunks], slots.starts[chunks + 1], beta, 1.0)
         moved, length2 = sweep(slots, bodies, law, reach, shared, like, size)
         work.sums[chunks, 0], work.sums[chunks, 1] = moved, length2
+
+
+@part
+def _turn_cell(shared, work: Work, beta):
+    """The shared cell extrapolated, what it was is remembered."""
+    for k in range(shared.shape[1]):
+        for l in range(shared.shape[1]):
+            value = shared[0, k, l]
+            shared[0, k, l] = value + beta * (value - work.rate_before[k, l])
+            shared[1, k, l], shared[2, k, l] = 0.0, 0.0
+            work.rate_before[k, l] = value
 
 
 @part

@@ -103,7 +103,7 @@ class ContactSolver:
         self.like = (0.0,) * dimension
         self.team = Team(1 if getattr(config, "DISABLE_JIT", 0) else threads or thread_count())
         self.wide = wide_by_default() if wide is None else wide
-        self.chunk = np.zeros(grain_count, np.int64)
+        self.chunk, self._grains = np.zeros(grain_count, np.int64), np.arange(grain_count)
         teams = -(-(grain_count // CHUNK_GRAINS) // TEAMS)
         self.divide(min(MOST_CHUNKS, TEAMS * teams) if grain_count >= 2 * CHUNK_GRAINS else 1)
         self._values, self._first, self._second = aligned((0,)), _indices(0), _indices(0)
@@ -133,7 +133,8 @@ class ContactSolver:
         """Divide the grains into chunks of equal size, as they are numbered or in this order."""
         self.chunk_count = chunk_count
         turn = np.arange(self.grain_count)
-        self.chunk[turn if order is None else order] = turn * chunk_count // self.grain_count
+        self._grains[:] = turn if order is None else order
+        self.chunk[self._grains] = turn * chunk_count // self.grain_count
 
     def solve(
         self, problem: Problem, state: State, settings: tuple[float, int, float, float]
@@ -254,6 +255,7 @@ class ContactSolver:
         work, dimension, chunks = self._work, self.dimension, self.chunk_count
         if work is None or len(work.sums) != chunks + 1 or len(work.before) != len(bodies):
             work = Work(
+                grains=self._grains,
                 before=aligned(bodies.shape),
                 cells=np.zeros((chunks + 1, 3, dimension, dimension)),
                 rate_before=np.zeros((dimension, dimension)),
