@@ -27,14 +27,14 @@ from granufab.kernels.slots import Slots
 from granufab.kernels.sweep import Law, defects, sweep
 from granufab.kernels.team import given_up, meet
 
-__all__ = ["CHECK", "CONTROLS", "SUMS", "Work", "solve"]
+__all__ = ["CHECK", "CONTROLS", "SUMS", "Work", "patient_sweeps", "solve"]
 
 CHECK = 40
 GROWTH = 1.1
 CAUTION = 1.3
 RECOVERY = 15
 PROGRESS, PATIENCE = 0.9, 5
-FALL = 0.9
+FALL, FEWEST = 0.9, 150
 BETA, DONE, SWEEPS, RESIDUAL, SHARE, VIOLATION, LOOK, RELATIVE = range(8)
 CONTROLS, SUMS = 8, 8
 
@@ -289,3 +289,9 @@ def next_cap(cap, first):
     if cap > 0.2:
         return 0.5 * cap
     return 0.0 if cap > 0.0 else first
+
+
+@part
+def patient_sweeps(updates, contacts):
+    """Sweeps without progress after which to stop, for so many contact updates without any."""
+    return max(float(FEWEST), updates / max(1.0, float(contacts)))

@@ -27,7 +27,7 @@ from granufab.kernels.problem import Problem, State
 from granufab.kernels.release import free_rates, release
 from granufab.kernels.schedule import Plan, arrange_chunk, list_homes, place_chunks
 from granufab.kernels.slots import Slots, fields
-from granufab.kernels.solve import Work, solve
+from granufab.kernels.solve import Work, patient_sweeps, solve
 from granufab.kernels.step_arrays import (
     AGAIN,
     ASSEMBLY,
@@ -241,7 +241,8 @@ def _iterate(step: Step, settings, like, wide, member, members):
     )  # fmt: skip
     size = fields(like, problem.coupled) * WIDTH
     tolerance, most, cap, floor, patience = settings
-    left = (tolerance, most - whole(control[SPENT]), cap, floor, patience)
+    calm = patient_sweeps(patience, control[COUNT])
+    left = (tolerance, most - whole(control[SPENT]), cap, floor, calm)
     sweeps, residual, share, violation = solve(
         step.slots, state.motion, shared_law, work, wide, size, left, member, members
     )

@@ -20,7 +20,7 @@ from granufab.kernels.pack import pack, solve_packed, unpack
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.schedule import Plan, schedule
 from granufab.kernels.slots import Slots, fields, places
-from granufab.kernels.solve import CONTROLS, SUMS, Work
+from granufab.kernels.solve import CONTROLS, SUMS, Work, patient_sweeps
 from granufab.kernels.sweep import Law
 from granufab.packing import Array, IntArray
 from granufab.simulate.bodies import aligned
@@ -35,8 +35,8 @@ TEAMS = 4
 """Chunks are a multiple of this, so that two or four threads have equal shares."""
 
 
-PATIENCE = 150.0
-"""Sweeps without progress before a group is solved together."""
+PATIENCE = 1.2e6
+"""Contact updates without progress before a group is solved together: what solving one costs."""
 
 
 class Solution(NamedTuple):
@@ -58,7 +58,7 @@ class Solution(NamedTuple):
 
 
 def patience_of(softness: float, cap: float) -> float:
-    """Sweeps without progress after which to stop; only compliant contacts can be mended."""
+    """Contact updates without progress before a stop; only compliant contacts can be mended."""
     return PATIENCE if cap > 0 and softness > 0 else np.inf
 
 
@@ -147,7 +147,7 @@ class ContactSolver:
             settings: (tolerance, max_sweeps, momentum cap, floor), see ``kernels.solve``.
         """
         tolerance, most, cap, floor = settings
-        patience = patience_of(problem.softness, cap)
+        patience = patient_sweeps(patience_of(problem.softness, cap), len(problem.length))
         packed = self.pack(problem, state)
         sweeps = mends = 0
         while True:

@@ -23,7 +23,7 @@ __all__ = ["MOST_CONTACTS", "group_of", "mend"]
 REST, WIDER = 0.05, 0.5
 """Share of the squared change left out of the first group, and by what it shrinks each time."""
 MOST_CONTACTS = 4000
-NEWTON_STEPS, NEWTON_TOLERANCE = 30, 1e-10
+NEWTON_STEPS, NEWTON_TOLERANCE = 15, 1e-10
 
 
 def group_of(problem: Problem, change: Array, before: int = 0) -> IntArray:
