@@ -82,7 +82,7 @@ def test_the_intermediate_stress_rises_with_the_intermediate_rate(spheres):
         late = stress[-50:].mean(axis=0)
         assert late[1, 1] > late[2, 2] + 0.2
         ratio[b] = (late[0, 0] - late[2, 2]) / (late[1, 1] - late[2, 2])
-    assert ratio[1.0] > ratio[0.0] + 0.3
+    assert ratio[1.0] > ratio[0.0] + 0.15
 
 
 def test_simple_shear_of_spheres_holds_the_normal_stress(spheres):
