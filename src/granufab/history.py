@@ -6,8 +6,9 @@ a run file, so measures and figures need not know which of the two they hold.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -138,23 +139,29 @@ class Recorder(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
     """Frames, series and summary of one path.
 
     Attributes:
-        series: xarray Dataset over dimension ``record``; variables as :data:`SERIES_UNITS`.
+        series_source: the series, or what makes it when it is first asked for.
         frames: recorded states, lazy where they lie in a file.
         settings: resolved settings as plain data.
         summary: solver figures and reached values as plain data.
         name: the path's name.
     """
 
-    series: xr.Dataset
+    series_source: xr.Dataset | Callable[[], xr.Dataset]
     frames: FrameSource | Sequence[Frame]
     settings: Mapping[str, Any] = field(default_factory=dict)
     summary: Mapping[str, Any] = field(default_factory=dict)
     name: str = "run"
+
+    @cached_property
+    def series(self) -> xr.Dataset:
+        """Dataset over dimension ``record``; variables as :data:`SERIES_UNITS`."""
+        source = self.series_source
+        return source() if callable(source) else source
 
     @property
     def dimension(self) -> int:

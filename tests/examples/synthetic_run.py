@@ -33,7 +33,7 @@ def synthetic_run(
         progress("shear", 0.5)
     attributes = {"path": case.name, "criterion": case.record.criterion}
     return Run(
-        series=series_dataset(rows, attributes),
+        series_source=series_dataset(rows, attributes),
         frames=frames,
         settings=case.model_dump(mode="json"),
         summary=_summary(case, rows),

@@ -77,7 +77,7 @@ def run_of(packings, *, stages=None, strains=None) -> Run:
         )
         for packing, stage, strain in zip(packings, stages, strains, strict=True)
     ]
-    return Run(series=xr.Dataset(), frames=frames, name="made-up")
+    return Run(series_source=xr.Dataset(), frames=frames, name="made-up")
 
 
 def residue(data: xr.Dataset) -> np.ndarray:

@@ -40,7 +40,7 @@ def path_of(packings, strains, settings=None, stages=None):
         )
         for k, (packing, strain) in enumerate(zip(packings, strains, strict=True))
     ]
-    return Run(series=series_dataset([], {}), frames=frames, settings=settings or {})
+    return Run(series_source=series_dataset([], {}), frames=frames, settings=settings or {})
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -32,8 +32,8 @@ def test_known_anisotropies_come_back_for_every_frame():
         for k, four in enumerate(known)
     ]
     run = Run(
-        series=series_dataset([], {}), frames=frames, settings={"material": {"friction": 0.5}},
-        summary={}, name="made-up",
+        series_source=series_dataset([], {}), frames=frames, summary={}, name="made-up",
+        settings={"material": {"friction": 0.5}},
     )  # fmt: skip
     table = measure_run(run, forces=True)
     for name, column in zip(("a_l", "a_n", "a_t"), np.array(known).T[1:], strict=True):

@@ -227,7 +227,7 @@ def path_of(packings):
         for k, packing in enumerate(packings)
     ]
     settings = {"record": {"criterion": "gap:0.05", "reach": 0.05, "z_definition": "z"}}
-    return Run(series=series_dataset([], {}), frames=frames, name="dense", settings=settings)
+    return Run(series_source=series_dataset([], {}), frames=frames, name="dense", settings=settings)
 
 
 def test_a_run_is_measured_frame_by_frame():

@@ -43,7 +43,7 @@ def _run(dimension: int, stages: tuple[int, ...] = (0,) * 7) -> Run:
                 direction=np.eye(dimension)[0],
             )
         )
-    return Run(series=xr.Dataset(), frames=frames)
+    return Run(series_source=xr.Dataset(), frames=frames)
 
 
 def _drawn(ax: Axes, label: str) -> tuple[np.ndarray, np.ndarray]:

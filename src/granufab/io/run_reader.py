@@ -40,7 +40,7 @@ def read_run(path: Path | str) -> Run:
         settings = file.json("settings")
         series, name = _series(file, settings)
         return Run(
-            series=series,
+            series_source=series,
             frames=RunFileFrames(path, file.text("created"), _frame_count(file)),
             settings=settings,
             summary=_summary(file),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -254,7 +255,7 @@ def run(
         "tolerance": solver.tolerance,
     }
     return Run(
-        series=series_dataset(memory.rows, attributes),
+        series_source=partial(series_dataset, memory.rows, attributes),
         frames=memory.frames,
         settings=dict(settings or {}),
         summary=summary,
