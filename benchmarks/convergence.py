@@ -89,14 +89,21 @@ def prepare_sample(out: Path, sample: tuple[str, float, int], grains: int) -> Pa
     return path
 
 
+def stored(out: Path, setting: dict[str, float], sample: tuple[str, float, int], grains: int):
+    """What a job left, or None."""
+    target = out / (_name(setting, sample, grains) + ".json")
+    return json.loads(target.read_text()) if target.exists() else None
+
+
 def run_job(out: Path, setting: dict[str, float], sample: tuple[str, float, int], grains: int):
     """Shear one sample with one setting and keep its series and summary."""
     import granufab.simulate as g
     from granufab.io import read
 
     target = out / (_name(setting, sample, grains) + ".json")
-    if target.exists():
-        return json.loads(target.read_text())
+    done = stored(out, setting, sample, grains)
+    if done is not None:
+        return done
     start = read(prepare_sample(out, sample, grains)).frames[0].packing
     result = g.shear(
         start,

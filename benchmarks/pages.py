@@ -1,6 +1,6 @@
 """Write the measured tables into the documentation pages, between markers.
 
-python benchmarks/pages.py convergence|peers|critical|triaxial|benchmarks OUT
+python benchmarks/pages.py convergence|accuracy|peers|critical|triaxial|benchmarks OUT
 """
 
 from __future__ import annotations
@@ -99,6 +99,15 @@ def convergence(folder: Path) -> None:
     insert("convergence.md", "convergence", write(folder, DOCS))
 
 
+def accuracy(folder: Path) -> None:
+    """What a tight residual costs."""
+    from accuracy import table
+
+    rows = json.loads((folder / "accuracy.json").read_text())
+    (DOCS / "accuracy.json").write_text(json.dumps(rows, indent=1) + "\n")
+    insert("convergence.md", "accuracy", table(rows))
+
+
 def benchmarks(folder: Path) -> None:
     """Tables of the long benchmark."""
     from benchmarks_page import tables
@@ -112,6 +121,6 @@ def benchmarks(folder: Path) -> None:
 if __name__ == "__main__":
     pages = {
         "peers": peers, "critical": critical, "convergence": convergence, "triaxial": triaxial,
-        "benchmarks": benchmarks,
+        "benchmarks": benchmarks, "accuracy": accuracy,
     }  # fmt: skip
     pages[sys.argv[1]](Path(sys.argv[2]))
