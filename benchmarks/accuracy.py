@@ -105,8 +105,8 @@ def table(rows: list[dict[str, Any]]) -> str:
     lines += [
         f"| {r['grains']} | {r['samples']} | {r['inertial_number']:.0e} | {r['law']} | "
         f"{r['tolerance']:.0e} | {r['step']:.0e} | {r['z_backbone']:.3f} | "
-        f"{_each(r['dz'])} | {r['a_signed']:.3f} | {_each(r['da'])} | {r['q_over_p']:.3f} | {r['sweeps']:.0f} | "
-        f"{100 * r['unconverged']:.2f} % |"
+        f"{_each(r['dz'])} | {r['a_signed']:.3f} | {_each(r['da'])} | "
+        f"{r['q_over_p']:.3f} | {r['sweeps']:.0f} | {100 * r['unconverged']:.2f} % |"
         for r in rows
     ]
     return "\n".join(lines)
