@@ -10,7 +10,7 @@ image), the force acts on j and −f on i, so compression gives f·n > 0.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TypeVar
+from typing import TypeGuard, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,9 +37,17 @@ def require(value: T | None, what: str, remedy: str = "") -> T:
     return value
 
 
+def _is_frozen(value: object, dtype: type) -> TypeGuard[NDArray]:
+    """Whether an array owns its numbers and nobody writes them, so that it needs no copy."""
+    if not isinstance(value, np.ndarray) or value.base is not None:
+        return False
+    flags = value.flags
+    return value.dtype == dtype and flags.c_contiguous and flags.owndata and not flags.writeable
+
+
 def _frozen(value: object, name: str, shape: tuple[int, ...], dtype: type = np.float64) -> NDArray:
     try:
-        array = np.array(value, dtype=dtype, order="C", copy=True)
+        array = value if _is_frozen(value, dtype) else np.array(value, dtype, order="C", copy=True)
     except (TypeError, ValueError) as error:
         raise InvalidPacking(f"{name} is not numeric: {error}") from None
     if array.size == 0 and 0 in shape:
@@ -165,10 +173,14 @@ class Contacts:
 
     def select(self, keep: NDArray[np.bool_]) -> Contacts:
         """The contacts where ``keep`` (shape (contact_count,)) is true."""
+        if np.all(keep):
+            return self
         chosen = {}
         for field in fields(self):
             value = getattr(self, field.name)
             chosen[field.name] = None if value is None else value[keep]
+            if value is not None:  # nobody else holds the new array, so it needs no copy
+                chosen[field.name].flags.writeable = False
         return Contacts(**chosen)
 
 

@@ -11,7 +11,9 @@ from granufab.cli import (
     bench,
     criterion,
     doctor,
+    export,
     fit,
+    import_data,
     info,
     measure,
     new,
@@ -34,6 +36,8 @@ app = typer.Typer(
 app.command("new")(new.new)
 app.command("run")(run.run)
 app.command("reproduce")(reproduce.reproduce)
+app.command("import")(import_data.import_data)
+app.command("export")(export.export)
 app.command("measure")(measure.measure)
 app.command("balance")(balance.balance)
 app.command("criterion")(criterion.criterion)

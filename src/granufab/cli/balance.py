@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from granufab.cli.choices import Definition
+from granufab.cli.foreign import ForeignOptions, foreign_options, open_run, print_summaries
 from granufab.cli.output_files import check_figure, check_table
 from granufab.errors import MissingData
 
@@ -42,14 +43,22 @@ HEADER = (
 )
 
 
+@foreign_options
 def balance(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run file.")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="RUN", help="Run file, or another program's data.")
+    ],
+    foreign: ForeignOptions,
     interval: Annotated[
         int, typer.Option(metavar="K", help="Frames between the states compared.")
     ] = 1,
     criterion: Annotated[
-        str, typer.Option(metavar="force|gap:δ|listed", help="Which pairs count as contacts.")
-    ] = "force",
+        str | None,
+        typer.Option(
+            metavar="force|gap:δ|listed",
+            help="Which pairs count as contacts; default the run's own.",
+        ),
+    ] = None,
     bins: Annotated[int, typer.Option(metavar="B", help="Bins of direction.")] = 18,
     keep: Annotated[
         float | None,
@@ -78,18 +87,20 @@ def balance(
     """
     from granufab.cli.output import print_json, print_rows
     from granufab.fabric import balance_run
-    from granufab.io import read
 
     check_table(out, force)
     check_figure(figure, force)
+    opened = open_run(files, foreign)
+    run = opened.name
     table = balance_run(
-        read(run),
+        opened.run,
         every=interval,
         criterion=criterion,
         z_definition=z_definition,
         bins=bins,
         keep=keep,
     )
+    print_summaries([opened])
     if out is not None:
         _write(table, out)
     if figure is not None:
@@ -100,16 +111,16 @@ def balance(
         print_json(list(_intervals(run, table)))
         return
     kept = "" if keep is None else f", kept to a gap of {keep:g} d"
-    title = f"{run}; contacts: {criterion}{kept}; rates per grain and unit strain"
+    title = f"{run}; contacts: {table.attrs['criterion']}{kept}; rates per grain and unit strain"
     print_rows(title, HEADER, _rows(table))
     print(_mean_rates(table, window))
 
 
-def _intervals(run: Path, table: xr.Dataset) -> Iterator[dict[str, Any]]:
+def _intervals(run: str, table: xr.Dataset) -> Iterator[dict[str, Any]]:
     """One plain object per interval; the lists run over the bins, or over their edges."""
     columns = {name: table[name].values.tolist() for name in (*SCALARS, *PARTS, *BY_BIN, "current")}
     shared = {
-        "source": str(run),
+        "source": run,
         "criterion": table.attrs["criterion"],
         "keep": table.attrs["keep"],
         "z_definition": table.attrs["z_definition"],
@@ -123,7 +134,7 @@ def _intervals(run: Path, table: xr.Dataset) -> Iterator[dict[str, Any]]:
 
 def _rows(table: xr.Dataset) -> Iterator[list[Any]]:
     strain, grains = table["strain"].values, table.attrs["grain_count"]
-    for row, item in enumerate(_intervals(Path(), table)):
+    for row, item in enumerate(_intervals("", table)):
         per = strain[row] * grains
         yield [
             f"{item['frame_before']}–{item['frame_after']}",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from granufab.cli.choices import Definition
+from granufab.cli.foreign import ForeignOptions, foreign_options, open_run, print_summaries
 from granufab.cli.output_files import check_figure
 from granufab.errors import InvalidSettings
 
@@ -25,8 +26,12 @@ HEADER = ("threshold", "z", "±", "a", "±", "az", "±", "rattlers", "±")
 KINDS = {"force": "normal force above [mean normal forces]", "gap": "gap below [mean diameters]"}
 
 
+@foreign_options
 def criterion(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="Run file.")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="RUN", help="Run file, or another program's data.")
+    ],
+    foreign: ForeignOptions,
     frame: Annotated[
         int, typer.Option(metavar="K", help="State, or the last of the window; default the last.")
     ] = -1,
@@ -49,15 +54,16 @@ def criterion(
     """Curves of z, a and az against a force and a gap threshold, with error bars."""
     from granufab.cli.output import print_json, print_rows
     from granufab.fabric import criterion_curves
-    from granufab.io import read
 
     check_figure(output, force)
     if bootstrap < 0:
         raise InvalidSettings(f"--bootstrap {bootstrap}: must be >= 0")
-    loaded = read(run)
+    opened = open_run(files, foreign)
+    run, loaded = opened.name, opened.run
     curves = criterion_curves(
         loaded, frame=frame, window=window, z_definition=z_definition, bootstrap=bootstrap
     )
+    print_summaries([opened])
     entry = _entry(run, loaded, frame, window, curves)
     if json:
         print_json(entry)
@@ -74,10 +80,10 @@ def criterion(
         cast("Figure", draw(curves)[0].figure).savefig(output, dpi=300)
 
 
-def _entry(source: Path, run: Run, frame: int, window: float, curves: xr.Dataset) -> dict[str, Any]:
+def _entry(source: str, run: Run, frame: int, window: float, curves: xr.Dataset) -> dict[str, Any]:
     """The curves as plain lists, one object per kind of threshold."""
     entry: dict[str, Any] = {
-        "source": str(source),
+        "source": source,
         "frame": frame % len(run.frames),
         "eps_q": run.frames[frame].eps_q,
         "window": window,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -11,8 +13,9 @@ import typer
 
 from granufab.cli.choices import Definition, Form
 from granufab.cli.evolution_fit import fit_law, print_law, write_law
+from granufab.cli.foreign import ForeignOptions, foreign_options, open_runs, print_summaries
 from granufab.cli.output_files import check_new
-from granufab.errors import GranufabError, MissingData
+from granufab.errors import GranufabError, MissingData, UnknownFormat
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,11 +28,16 @@ Method = Literal["critical", "envelope", "lines"]
 Mode = Literal["compression", "extension"]
 
 
+@foreign_options
 def fit(
     series: Annotated[
         list[Path],
-        typer.Argument(metavar="SERIES", help="series.csv, run.h5, or a CSV with z and a."),
+        typer.Argument(
+            metavar="SERIES",
+            help="series.csv, run.h5, a CSV with z and a, or other programs' data.",
+        ),
     ],
+    foreign: ForeignOptions,
     method: Annotated[Method, typer.Option(help="How z_min and z_max are found.")] = "critical",
     z_definition: Annotated[
         Definition | None, typer.Option(help="Which z; default z_backbone, or z if alone.")
@@ -60,7 +68,7 @@ def fit(
     from granufab.reproduce.report import fit_entry
 
     check_new(evolution, force)
-    paths = [path for file in series for path in read_paths(file)]
+    paths = read_paths(series, foreign)
     given = {"dimension": dimension, "mode": mode, "b": b}
     found, definition = fit_series(paths, method, z_definition, **given)
     entry = fit_entry(found) | {
@@ -113,17 +121,45 @@ def fit_series(
     return fit_accessible_states(strain, z, a, method=method, **options), definition
 
 
-def read_paths(file: Path) -> list[xr.Dataset]:
-    """The series of a run file, or of each path in a CSV; rows count as strain if none is given.
+def read_paths(files: Sequence[Path], foreign: ForeignOptions) -> list[xr.Dataset]:
+    """The series of run files and of each path in a CSV; frames of other data are measured.
 
-    Their attributes tell dimension and b where these are known.
+    Rows (frames) count as strain where it is unknown. Attributes tell dimension and b where these
+    are known.
     """
-    from granufab.io import read, read_series
+    paths: list[xr.Dataset] = []
+    for is_series, group in groupby(files, lambda file: _is_series(file, foreign)):
+        part = list(group)
+        tables = _written_series(part) if is_series else _measured_series(part, foreign)
+        paths += [path for table in tables for path in _single_paths(table)]
+    return paths
+
+
+def _written_series(files: Sequence[Path]) -> list[xr.Dataset]:
+    from granufab.io import read_series
+
+    return [_beside(read_series(file), file) for file in files]
+
+
+def _measured_series(files: Sequence[Path], foreign: ForeignOptions) -> list[xr.Dataset]:
+    from granufab.fabric import with_series
     from granufab.reproduce.symmetry import described_series
 
-    text = _is_text(file)
-    table = _beside(read_series(file), file) if text else described_series(read(file))
-    if "eps_q" not in table:
+    opened = open_runs(files, foreign, own=("dimension",))
+    tables = [described_series(with_series(one.run)) for one in opened]
+    print_summaries(opened)
+    for one, table in zip(opened, tables, strict=True):
+        if one.summary is not None and bool(table["eps_q"].isnull().all()):
+            print(
+                f"granufab: {one.name}: the strain is unknown, each frame counts as 1; give "
+                "--strain (per frame)",
+                file=sys.stderr,
+            )
+    return tables
+
+
+def _single_paths(table: xr.Dataset) -> list[xr.Dataset]:
+    if "eps_q" not in table or bool(table["eps_q"].isnull().all()):
         table = table.assign(eps_q=("record", [float(k) for k in range(table.sizes["record"])]))
     if "path" not in table.coords:
         return [table]
@@ -146,13 +182,27 @@ def _beside(series: xr.Dataset, file: Path) -> xr.Dataset:
     return series.assign_attrs(symmetry_attributes(run_symmetry(settings or {})))
 
 
-def _is_text(file: Path) -> bool:
+def _is_series(file: Path, foreign: ForeignOptions) -> bool:
+    """Whether it is a text of z and a, or no text that another program's format recognises."""
+    from granufab.io import detect
+
+    if foreign.format is not None or file.is_dir():
+        return False
     try:
         with file.open("rb") as stream:
             head = stream.read(512)
     except OSError as error:
         raise MissingData(f"{file}: cannot be read ({error.strerror})") from None
-    return b"\0" not in head
+    if b"\0" in head:
+        return False
+    names = {name.strip().strip('"') for name in head.decode(errors="replace").split(",")}
+    if foreign.columns is not None or "a" in names:
+        return foreign.columns is None
+    try:
+        detect(file)
+    except UnknownFormat:
+        return True
+    return False
 
 
 def _default_definition(paths: Sequence[xr.Dataset]) -> str:

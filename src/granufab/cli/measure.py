@@ -10,6 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from granufab.cli.choices import Definition
+from granufab.cli.foreign import (
+    ForeignOptions,
+    Opened,
+    foreign_options,
+    open_runs,
+    print_summaries,
+)
 from granufab.cli.output_files import check_table
 from granufab.errors import InvalidSettings, MissingData
 
@@ -41,11 +48,19 @@ SHOWN = {
 """Columns of the table for people, where a file has them."""
 
 
+@foreign_options
 def measure(
-    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="Run files.")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE", help="Run files, or other programs' data.")
+    ],
+    foreign: ForeignOptions,
     criterion: Annotated[
-        str, typer.Option(metavar="force|gap:δ|listed", help="Which pairs count as contacts.")
-    ] = "force",
+        str | None,
+        typer.Option(
+            metavar="force|gap:δ|listed",
+            help="Which pairs count as contacts; default the run's own.",
+        ),
+    ] = None,
     z_definition: Annotated[
         Definition, typer.Option(help="Whose contacts and grains the fabric counts.")
     ] = "z_backbone",
@@ -66,29 +81,31 @@ def measure(
     from granufab.cli.output import print_json, print_rows
 
     check_table(out, force)
-    tables = [_measure_file(file, criterion, z_definition, frame, forces) for file in files]
+    opened = open_runs(files, foreign)
+    tables = [_measure_run(one, criterion, z_definition, frame, forces) for one in opened]
+    print_summaries(opened)
     if out is not None:
         _write(tables, out)
     if json:
         print_json([state for table in tables for state in _states(table)])
         return
-    for file, table in zip(files, tables, strict=True):
+    for one, table in zip(opened, tables, strict=True):
         names = [name for name in SHOWN if name in table.variables]
         rows = [[state[name] for name in names] for state in _states(table)]
-        title = f"{file}; contacts: {criterion}; fabric of: {z_definition}"
+        names_of = " + ".join(str(file) for file in one.files)
+        title = f"{names_of}; contacts: {table.attrs['criterion']}; fabric of: {z_definition}"
         print_rows(title, [SHOWN[name] for name in names], rows)
 
 
-def _measure_file(
-    file: Path, criterion: str, z_definition: Any, frame: int | None, forces: bool
+def _measure_run(
+    one: Opened, criterion: str | None, z_definition: Any, frame: int | None, forces: bool
 ) -> xr.Dataset:
     """One row per state, with its source and number."""
     from dataclasses import replace
 
     from granufab.fabric import measure_run
-    from granufab.io import read
 
-    run = read(file)
+    file, run = one.name, one.run
     numbers = list(range(len(run.frames)))
     if frame is not None:
         if not -len(numbers) <= frame < len(numbers):
@@ -97,7 +114,7 @@ def _measure_file(
         run = replace(run, frames=[run.frames[frame]])
     table = measure_run(run, criterion=criterion, z_definition=z_definition, forces=forces)
     _explain_unknown(file, run, table)
-    table = table.assign(source=("frame", [str(file)] * len(numbers)))
+    table = table.assign(source=("frame", [file] * len(numbers)))
     return table.assign_coords(frame=numbers)
 
 
@@ -111,7 +128,7 @@ def _states(table: xr.Dataset) -> Iterator[dict[str, Any]]:
         yield {name: column[row] for name, column in columns.items()} | definitions
 
 
-def _explain_unknown(file: Path, run: Run, table: xr.Dataset) -> None:
+def _explain_unknown(file: str, run: Run, table: xr.Dataset) -> None:
     """Say once, on standard error, why some columns are unknown throughout."""
     if not any(bool(table[name].isnull().all()) for name in table.data_vars):
         return

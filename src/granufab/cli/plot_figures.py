@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from granufab.errors import GranufabError, InvalidSettings
+from granufab.errors import GranufabError, InvalidSettings, MissingData
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,6 +68,10 @@ class Request:
     def window(self) -> tuple[int, tuple[float, float]]:
         """Stage of the wanted state, and the later half of ∫|dε_q| of that stage up to it."""
         end = self.state
+        if end.eps_q_total != end.eps_q_total:
+            raise MissingData(
+                f"--figure {self.figure}: the strain of this data is unknown; give --strain"
+            )
         frames = (self.run.frames[k] for k in range(len(self.run.frames)))
         begin = min(f.eps_q_total for f in frames if f.stage == end.stage)
         return end.stage, (0.5 * (begin + end.eps_q_total), end.eps_q_total)
@@ -109,9 +113,10 @@ class Drawing:
 def _domain(request: Request) -> Any:
     """The fitted domain, or None with a word on standard error where the runs do not give one."""
     from granufab.cli.fit import fit_series
+    from granufab.fabric import with_series
     from granufab.reproduce.symmetry import described_series
 
-    series = [described_series(run) for run in request.runs.values()]
+    series = [described_series(with_series(run)) for run in request.runs.values()]
     try:
         return fit_series(series, "critical", request.z_definition)[0]
     except GranufabError as error:

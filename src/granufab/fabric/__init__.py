@@ -18,6 +18,7 @@ from granufab.fabric.ensemble import late_frames
 from granufab.fabric.fluctuations import fluctuations
 from granufab.fabric.force_values import force_values
 from granufab.fabric.forces import force_statistics
+from granufab.fabric.frame_series import frame_series, with_series
 from granufab.fabric.harmonics import real_harmonics, sphere_density, sphere_orientation
 from granufab.fabric.homogeneity import homogeneity, local_strain
 from granufab.fabric.measure import measure, measure_run, quick_measure
@@ -25,6 +26,7 @@ from granufab.fabric.neighbours import branch_vectors, neighbours_within
 from granufab.fabric.network import Network, select_network
 from granufab.fabric.orientation import orientation, symmetry_axis
 from granufab.fabric.rattlers import RATTLER_RULES, backbone, minimum_contacts
+from granufab.fabric.run_definitions import run_definitions
 from granufab.fabric.spectrum import fluctuation_spectrum
 from granufab.fabric.stress import solid_fraction, stress_ratio, stress_tensor
 from granufab.fabric.stress_force_fabric import anisotropy_stress_ratio, stress_force_fabric
@@ -75,6 +77,7 @@ __all__ = [
     "force_statistics",
     "force_values",
     "fourth_order_tensor",
+    "frame_series",
     "homogeneity",
     "intermediate_ratio",
     "late_frames",
@@ -94,6 +97,7 @@ __all__ = [
     "quick_measure",
     "rates_by_sampling",
     "real_harmonics",
+    "run_definitions",
     "select_contacts",
     "select_network",
     "signed_anisotropy",
@@ -107,4 +111,5 @@ __all__ = [
     "texture",
     "velocity_field",
     "wall_support",
+    "with_series",
 ]

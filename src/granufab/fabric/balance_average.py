@@ -94,6 +94,8 @@ _RATES = {
 def _inside(
     data: xr.Dataset, window: tuple[float, float] | None
 ) -> tuple[xr.Dataset, tuple[float, float]]:
+    if not np.isfinite(data["strain"].to_numpy()).any():
+        raise MissingData("the strain between the frames is unknown; give --strain (per frame)")
     low, high = window or _plateau(data)
     slack = 1e-6 * (1.0 + abs(high))
     inside = (

@@ -183,6 +183,7 @@ def measure_run(
         if forces:
             row |= _force_row(frame, run, rule, definition, fewest, direction)
         rows.append(row | _frame_values(frame))
+        del frame  # before the next one is read
     attributes = {
         "path": run.name,
         "criterion": rule.text,

@@ -27,7 +27,7 @@ def stress_tensor(packing: Packing) -> Array:
     Raises:
         MissingData: there is no cell, or no contact force.
     """
-    cell = require(packing.cell, "cell lengths", "give the cell of the packing")
+    cell = require(packing.cell, "cell lengths", "give the cell of the packing (--cell)")
     contacts, walls = packing.contacts, packing.wall_contacts
     if contacts is None and walls is None:
         raise MissingData("contacts are not in this data, so its stress is unknown")
@@ -61,7 +61,7 @@ def solid_fraction(packing: Packing) -> float:
     Raises:
         MissingData: there is no cell.
     """
-    cell = require(packing.cell, "cell lengths", "give the cell of the packing")
+    cell = require(packing.cell, "cell lengths", "give the cell of the packing (--cell)")
     radius = packing.grains.radius
     if packing.dimension == 2:
         solid = math.pi * float(np.sum(radius**2))

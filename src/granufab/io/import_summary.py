@@ -1,0 +1,71 @@
+"""What was read from somebody else's data, and what was done to it: for a person and a program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+__all__ = ["ImportSummary"]
+
+
+@dataclass(slots=True, kw_only=True)
+class ImportSummary:
+    """Counts and conventions, filled while frames are read.
+
+    Attributes:
+        format: name of the format.
+        files: read.
+        frames: in the series; frames_read of them were read so far, empty_frames had no grains.
+        grains, contacts: of the frame read last.
+        walls_dropped, wall_contacts_dropped, duplicates_dropped, self_contacts_dropped: of all
+            frames read.
+        rattlers: grains with fewer than two contacts in the frame read last, or None.
+        conventions: what the normals, forces and dimensions turned out to be, by topic.
+        unknown_columns: of the files, not understood.
+        notes: of the reader.
+    """
+
+    format: str
+    files: tuple[str, ...] = ()
+    frames: int = 0
+    frames_read: int = 0
+    empty_frames: int = 0
+    grains: int = 0
+    contacts: int | None = None
+    walls_dropped: int = 0
+    wall_contacts_dropped: int = 0
+    duplicates_dropped: int = 0
+    self_contacts_dropped: int = 0
+    rattlers: int | None = None
+    conventions: dict[str, str] = field(default_factory=dict)
+    unknown_columns: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def plain(self) -> Mapping[str, Any]:
+        """Plain data, for JSON."""
+        return {name: getattr(self, name) for name in self.__slots__}
+
+    def lines(self) -> list[str]:
+        """Lines for a person; what is zero or unknown is left out."""
+        dropped = {
+            "wall bodies": self.walls_dropped,
+            "wall contacts": self.wall_contacts_dropped,
+            "pairs listed twice": self.duplicates_dropped,
+            "contacts of a grain with itself": self.self_contacts_dropped,
+        }
+        left_out = ", ".join(f"{count} {what}" for what, count in dropped.items() if count)
+        text = [
+            f"{self.format}: {self.frames} frames in {len(self.files)} files, "
+            f"{self.grains} grains, "
+            + ("no contacts listed" if self.contacts is None else f"{self.contacts} contacts")
+            + ("" if self.rattlers is None else f", {self.rattlers} rattlers")
+        ]
+        if left_out:
+            text.append(f"left out: {left_out}")
+        if self.empty_frames:
+            text.append(f"empty frames: {self.empty_frames}")
+        text += [f"{topic}: {what}" for topic, what in self.conventions.items()]
+        if self.unknown_columns:
+            text.append(f"columns not understood: {', '.join(self.unknown_columns)}")
+        return text + list(self.notes)

@@ -1,0 +1,105 @@
+"""What a user adds to data that do not say it themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from granufab.errors import InvalidSettings
+from granufab.io.found import FoundCell
+
+__all__ = ["ReadOptions"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReadOptions:
+    """Options of :func:`granufab.read` for foreign data.
+
+    Attributes:
+        dimension: 2 or 3; default from the file, else from the positions.
+        cell: edge lengths of a box that starts at the smallest coordinates' corner, or six numbers
+            (lower corner, edges) in 3D and four in 2D; default from the file.
+        periodic: axes, for example "xy"; "" for none; default from the file.
+        columns: names or 1-based numbers of columns, by what they hold, as a TOML file's
+            sections give them.
+        radius: of every grain, where the file has none.
+        walls: False drops bodies and contacts of walls; True keeps bodies as grains.
+        friction: coefficient between grains, where the file does not tell it.
+        strain: deviatoric strain ε_q from one frame to the next, where no cell deforms.
+        axis: contraction axis of a' and ε_q, "x", "y", "z" or components "0,1,0".
+    """
+
+    dimension: int | None = None
+    cell: tuple[float, ...] | None = None
+    periodic: str | None = None
+    columns: Mapping[str, Mapping[str, str | int]] = field(default_factory=dict)
+    radius: float | None = None
+    walls: bool = False
+    friction: float | None = None
+    strain: float | None = None
+    axis: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.dimension not in (None, 2, 3):
+            raise InvalidSettings(f"dimension is {self.dimension!r}, allowed: 2 or 3")
+        if self.cell is not None and len(self.cell) not in (2, 3, 4, 6):
+            raise InvalidSettings(
+                f"cell has {len(self.cell)} numbers, allowed: edges (2 or 3), or lower corner and "
+                "edges (4 or 6)"
+            )
+        if self.periodic is not None and set(self.periodic) - set("xyz"):
+            raise InvalidSettings(f"periodic is {self.periodic!r}, allowed: axes of xyz, or none")
+        if self.radius is not None and not self.radius > 0:
+            raise InvalidSettings(f"radius is {self.radius!r}, must be > 0")
+        if self.friction is not None and not self.friction >= 0:
+            raise InvalidSettings(f"friction is {self.friction!r}, must be ≥ 0")
+        self.direction(2)
+
+    def direction(self, dimension: int) -> np.ndarray | None:
+        """Unit vector of ``axis``, or None.
+
+        Raises:
+            InvalidSettings: it is no axis and no vector of this dimension.
+        """
+        if self.axis is None:
+            return None
+        names = "xyz"
+        if self.axis in names and len(self.axis) == 1:
+            place = names.index(self.axis)
+            if place < dimension:
+                return np.eye(dimension)[place]
+            if dimension == 2:
+                return None
+        try:
+            vector = np.array([float(part) for part in self.axis.split(",")])
+        except ValueError:
+            vector = np.zeros(0)
+        if len(vector) not in (2, 3) or not np.linalg.norm(vector) > 0:
+            raise InvalidSettings(
+                f"axis is {self.axis!r}, allowed: x, y, z or components such as 0,1,0"
+            )
+        vector = vector[:dimension]
+        return vector / np.linalg.norm(vector)
+
+    def box(self, dimension: int, lowest: np.ndarray) -> FoundCell | None:
+        """The cell that the user gives, with the corner at ``lowest`` where none is given.
+
+        Raises:
+            InvalidSettings: the numbers are for another dimension.
+        """
+        if self.cell is None:
+            return None
+        given = np.array(self.cell, float)
+        if len(given) not in (dimension, 2 * dimension):
+            raise InvalidSettings(
+                f"cell has {len(given)} numbers, a {dimension}D one needs {dimension} edges, or "
+                f"lower corner and edges"
+            )
+        origin = given[:dimension] if len(given) == 2 * dimension else lowest
+        matrix = np.diag(given[-dimension:])
+        axes = "xyz"[:dimension] if self.periodic is None else self.periodic
+        return FoundCell(
+            matrix=matrix, origin=origin, periodic=tuple(name in axes for name in "xyz"[:dimension])
+        )
