@@ -135,7 +135,7 @@ def _run(count: int) -> Run:
         def __getitem__(self, index: int) -> object:
             return SimpleNamespace(packing=folder_states[index])
 
-    return Run(series=series_dataset([], {}), frames=States())  # type: ignore[arg-type]
+    return Run(series_source=series_dataset([], {}), frames=States())  # type: ignore[arg-type]
 
 
 def test_a_run_becomes_one_file_or_a_numbered_series(tmp_path: Path) -> None:

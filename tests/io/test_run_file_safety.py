@@ -187,7 +187,7 @@ def test_a_flipped_byte_in_the_large_arrays_is_noticed(
 def test_files_that_are_not_ours(tmp_path: Path) -> None:
     with pytest.raises(MissingData, match="no such file"):
         gio.read(tmp_path / "nowhere.h5")
-    with pytest.raises(MissingData):
+    with pytest.raises(UnknownFormat, match="is of no known format"):
         gio.read(tmp_path)
     for content in (b"", b"x", b"\x89HDF", b"PK\x03\x04 zip", b"z,a\n3,0.2\n"):
         path = tmp_path / "other.h5"
@@ -196,7 +196,7 @@ def test_files_that_are_not_ours(tmp_path: Path) -> None:
             gio.read(path)
     with h5py.File(tmp_path / "foreign.h5", "w") as file:
         file["data"] = np.arange(3)
-    with pytest.raises(UnknownFormat, match="not a granufab run file"):
+    with pytest.raises(UnknownFormat, match="HDF5 of no known kind"):
         gio.read(tmp_path / "foreign.h5")
     with pytest.raises(UnknownFormat, match="not a granufab run file"):
         gio.describe(tmp_path / "foreign.h5")
