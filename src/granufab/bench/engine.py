@@ -215,12 +215,12 @@ def _copied_array(array: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def _make_sweeps(slots, bodies, law, cell, like, size, count):
+def _make_sweeps(slots, bodies, law, cell, like, size, count, beta):
     moved = 0.0
     for _ in range(count):
         cell[1:] = 0.0
         moved, _length2 = sweep(
-            slots, bodies, law, (0, slots.starts[-1], 0.0, 1.0), cell, like, size
+            slots, bodies, law, (0, slots.starts[-1], beta, 1.0), cell, like, size
         )
     return moved
 
@@ -249,7 +249,7 @@ def sweep_seconds(
         cell = np.zeros((3, case.dimension, case.dimension))
         cell[0] = state.rate
         like = (solver.like,) if solver.wide else solver.like
-        _make_sweeps(packed.slots, state.motion, packed.law, cell, like, packed.size, sweeps)
+        _make_sweeps(packed.slots, state.motion, packed.law, cell, like, packed.size, sweeps, BETA)
         state.rate[:] = cell[0]
     else:
         solver.iterate(packed, state, (-1.0, sweeps, 0.0, 1.0))

@@ -8,12 +8,13 @@ tuple of D zeros, numbers or lanes, that the functions of ``vectors`` expect.
 from __future__ import annotations
 
 from granufab.kernels.lanes import WIDTH
-from granufab.kernels.standins import is_lanes
+from granufab.kernels.standins import Address, is_lanes
 from granufab.kernels.tracing import spread, traced, whole
 
 __all__ = [
     "address",
     "body_of",
+    "extrapolate_body",
     "find_body",
     "inverse_mass_of",
     "item",
@@ -121,14 +122,30 @@ def put_body(bodies, where, body):
 
 
 @traced
-def prefetch(slots, bodies, one, two, batch, size, like):
-    """Have a batch of ``size`` fields and its bodies brought near; nothing for single contacts."""
+def extrapolate_body(bodies, before, row, beta, like):
+    """bodies ← bodies + β (bodies − before), before ← bodies, for the body of a row."""
+    width = _body_width(like[0] if isinstance(like[0], tuple) else like)
+    start = row * width
+    if isinstance(bodies, Address):
+        bodies.move_on(before, start, width, beta)
+        return
+    for k in range(start, start + width):
+        now = bodies[k]
+        bodies[k], before[k] = now + beta * (now - before[k]), now
+
+
+@traced
+def prefetch(slots, bodies, one, two, batch, size, fields, like):
+    """Have a batch of ``size`` numbers and its bodies brought near; nothing for single contacts.
+
+    ``fields`` of the batch are asked for, a line of the cache each.
+    """
     if not isinstance(like[0], tuple):
         return
     for index in (one, two):
         bodies.rows(index, batch * WIDTH, _body_width(like[0])).prefetch()
-    for field in range(size):
-        slots.prefetch((batch * size + field) * WIDTH)
+    for field in range(fields):
+        slots.prefetch(batch * size + field * WIDTH)
 
 
 def _body_width(like):

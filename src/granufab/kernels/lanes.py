@@ -21,6 +21,7 @@ __all__ = [
     "gather",
     "item_of",
     "load_lanes",
+    "move_on",
     "prefetch",
     "rows_of",
     "scatter",
@@ -80,6 +81,19 @@ def load_lanes(builder: Any, address: Any, place: Any) -> Any:
 def store_lanes(builder: Any, address: Any, place: Any, value: Any) -> None:
     """Write eight neighbouring items of a line of numbers."""
     builder.store(value, _wide(builder, item_of(builder, address, place), WIDTH), align=8)
+
+
+def move_on(builder: Any, now: Any, before: Any, width: int, factor: Any, flags: Any) -> None:
+    """now ← now + factor·(now − before), before ← now, for ``width`` neighbouring items."""
+    now, before = _wide(builder, now, width), _wide(builder, before, width)
+    value = builder.load(now, align=8)
+    share = ir.Constant(value.type, ir.Undefined)
+    share = builder.insert_element(share, factor, ir.Constant(ir.IntType(32), 0))
+    share = _shuffle(builder, share, share, [0] * width)
+    step = builder.fsub(value, builder.load(before, align=8), flags=flags)
+    step = builder.fmul(share, step, flags=flags)
+    builder.store(builder.fadd(value, step, flags=flags), now, align=8)
+    builder.store(value, before, align=8)
 
 
 def rows_of(builder: Any, table: Any, index: Any, place: Any, width: int) -> list[Any]:

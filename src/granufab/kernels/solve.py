@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from granufab.kernels.access import address, item, set_item
+from granufab.kernels.access import address, extrapolate_body, item
 from granufab.kernels.cell import move_cell
 from granufab.kernels.options import part
 from granufab.kernels.slots import Slots
@@ -128,16 +128,12 @@ def _remember(bodies, work: Work, member, members):
 
 
 @part
-def _extrapolate(bodies, work: Work, chunk, chunks, beta):
+def _extrapolate(bodies, work: Work, chunk, chunks, like):
     """now ← now + β (now − before), before ← now, for the grains of a chunk; walls never change."""
-    count, width = len(work.grains), bodies.shape[1]
+    count, beta = len(work.grains), work.control[BETA]
     now, before, grains = address(bodies), address(work.before), address(work.grains)
     for turn in range(_first_of(chunk, chunks, count), _first_of(chunk + 1, chunks, count)):
-        row = item(grains, turn) * width
-        for k in range(row, row + width):
-            value = item(now, k)
-            set_item(now, k, value + beta * (value - item(before, k)))
-            set_item(before, k, value)
+        extrapolate_body(now, before, item(grains, turn), beta, like)
 
 
 @part
@@ -167,7 +163,7 @@ def _sweep_all(slots: Slots, bodies, law: Law, work: Work, like, size, member, m
     chunks = len(slots.starts) - 2
     beta, cells = work.control[BETA], work.cells
     for chunk in range(member, chunks, members):
-        _extrapolate(bodies, work, chunk, chunks, beta)
+        _extrapolate(bodies, work, chunk, chunks, like)
         _start_cell(cells[chunk], work, beta)
         reach = (slots.starts[chunk], slots.starts[chunk + 1], beta, float(chunks))
         moved, length2 = sweep(slots, bodies, law, reach, cells[chunk], like, size)

@@ -188,6 +188,11 @@ class Address:
         """Write eight neighbouring numbers."""
         lanes.store_lanes(self.builder, self.value, as_integer(place), value.value)
 
+    def move_on(self, before: Address, place: Any, width: int, factor: Any) -> None:
+        """See :func:`lanes.move_on`."""
+        factor = as_double(self.builder, factor)
+        lanes.move_on(self.builder, self._item(place), before._item(place), width, factor, _FLAGS)
+
     def rows(self, index: Address, place: Any, width: int) -> Rows:
         """The eight rows of this table that an index names at ``place``."""
         found = lanes.rows_of(self.builder, self.value, index.value, as_integer(place), width)

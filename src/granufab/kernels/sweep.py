@@ -118,7 +118,7 @@ def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
     lag = lag_of(slots.starts[-1])
     until = lag
     for batch in range(start, end):
-        _announce(values, table, one, two, smaller(batch + AHEAD, end - 1), like)
+        _announce(values, table, one, two, smaller(batch + AHEAD, end - 1), size, like)
         for lane in range(0, WIDTH, stride(like)):
             base, place = batch * size + lane, batch * WIDTH + lane
             at = (values, one, two, table, base, place)
@@ -147,10 +147,10 @@ def sweep(slots: Slots, bodies, shared: Law, reach, cell, like, size):
 
 
 @traced
-def _announce(values, bodies, one, two, batch, like):
+def _announce(values, bodies, one, two, batch, size, like):
     """Ask for the memory of a batch, some batches before it is swept."""
     if isinstance(like[0], tuple):
-        prefetch(values, bodies, one, two, batch, places(like[0]).cross + 1, like)
+        prefetch(values, bodies, one, two, batch, size, places(like[0]).cross, like)
 
 
 @traced
