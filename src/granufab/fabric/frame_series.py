@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from granufab.fabric.measure import measure_run
 from granufab.history import SERIES_UNITS, Run, series_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["frame_series", "with_series"]
 

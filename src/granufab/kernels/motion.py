@@ -5,7 +5,7 @@ from __future__ import annotations
 from granufab.kernels.impulses import local_velocity
 from granufab.kernels.options import kernel, part
 from granufab.kernels.problem import Problem
-from granufab.kernels.vectors import compose, load, load_tangent, norm2, store
+from granufab.kernels.vectors import compose, load, load_tangent, store
 
 __all__ = ["kinetic_energy", "relative_velocity", "virial"]
 
@@ -36,17 +36,12 @@ def virial(problem: Problem, impulse_n, impulse_t, reach, total, like):
                 total[k * dimension + l] += push[k] * n[l] * problem.length[c]
 
 
-@kernel
 def kinetic_energy(motion, grain_count, spin_factor, like):
     """Σ ½ m c² + ½ I ω² over the grains [J]."""
-    total = 0.0
-    heavy = len(like) + (1 if len(like) == 2 else 3)
-    for i in range(grain_count):
-        square = norm2(load(motion, i, like))
-        turning = 0.0
-        for k in range(len(like), heavy):
-            turning += motion[i, k] ** 2
-        if spin_factor > 0.0:
-            square += turning / spin_factor
-        total += 0.5 * square / motion[i, heavy]
-    return total
+    dimension = len(like)
+    heavy = dimension + (1 if dimension == 2 else 3)
+    grains = motion[:grain_count]
+    square = (grains[:, :dimension] ** 2).sum(axis=1)
+    if spin_factor > 0.0:
+        square += (grains[:, dimension:heavy] ** 2).sum(axis=1) / spin_factor
+    return float(0.5 * (square / grains[:, heavy]).sum())

@@ -205,18 +205,25 @@ def morton_order(position: np.ndarray, origin: np.ndarray, inverse: np.ndarray) 
     return np.argsort(_morton_keys(position, origin, inverse), kind="stable")
 
 
-@kernel
 def _morton_keys(position, origin, inverse):
-    """Place of every grain along the curve."""
-    count, dimension = position.shape
-    bits = 20 if dimension == 3 else 30
-    keys = zeros((count,), np.int64)
-    for i in range(count):
-        for k in range(dimension):
-            s = 0.0
-            for l in range(dimension):
-                s += inverse[k, l] * (position[i, l] - origin[l])
-            place = whole((s - floor(s)) * 2.0**bits)
-            for bit in range(bits):
-                keys[i] |= ((place >> bit) & 1) << (bit * dimension + k)
-    return keys
+    """Place of every grain along the curve: the bits of its D fractional coordinates in turn."""
+    dimension = position.shape[1]
+    fraction = (position - origin) @ inverse.T
+    fraction -= np.floor(fraction)
+    place = (fraction * 2.0 ** (20 if dimension == 3 else 30)).astype(np.int64)
+    for shift, mask in _SPREAD[dimension]:
+        place = (place | (place << shift)) & mask
+    return (place << np.arange(dimension)).sum(axis=1)
+
+
+_SPREAD = {
+    2: (
+        (16, 0x0000FFFF0000FFFF), (8, 0x00FF00FF00FF00FF), (4, 0x0F0F0F0F0F0F0F0F),
+        (2, 0x3333333333333333), (1, 0x5555555555555555),
+    ),
+    3: (
+        (32, 0x001F00000000FFFF), (16, 0x001F0000FF0000FF), (8, 0x100F00F00F00F00F),
+        (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249),
+    ),
+}  # fmt: skip
+"""By dimension: shifts and masks that move the bits of a number D places apart."""
