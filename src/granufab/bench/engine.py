@@ -78,7 +78,7 @@ class Streams(NamedTuple):
         impulse_n, impulse_t: shapes (contact_count,), (contact_count, 1 or 3); changed by a sweep.
         before_n, before_t: impulses of the iterate before; changed by a sweep.
         beta: momentum of the impulses.
-        dilation: shape (1,); changed by a sweep.
+        dilation: and Σ|P|², shape (2,); changed by a sweep.
     """
 
     contact_count: int
@@ -125,6 +125,7 @@ def streams_of(case: Case) -> Streams:
         return np.stack([line(field + k) for k in range(count)], axis=1)
 
     tangents = p.offset_t.shape[1]
+    size2 = np.sum(case.state.impulse_n**2) + np.sum(case.state.impulse_t**2)
     return Streams(
         contact_count=batches * WIDTH,
         lag=WIDTH * lag_of(batches),
@@ -146,7 +147,7 @@ def streams_of(case: Case) -> Streams:
         before_n=line(at.before_n),
         before_t=columns(at.before_t, tangents),
         beta=BETA,
-        dilation=np.array(case.state.rate[:1, 0]),
+        dilation=np.array([case.state.rate[0, 0], size2]),
     )
 
 

@@ -34,7 +34,7 @@ struct Problem {
     double* before_n;              // impulses of the iterate before
     double* before_t;
     double beta;                   // momentum: the sweep starts from x + beta (x - before)
-    double* dilation;              // one number
+    double* dilation;              // and, after it, the squared length of all impulses
 };
 
 struct Disk {
@@ -66,7 +66,7 @@ double sweep_disks(const Problem& p) {
     double* __restrict before_t = p.before_t;
     const double beta = p.beta;
     const double eps = p.eps, kappa = p.kappa, w_cell = p.w_cell;
-    double dilation = *p.dilation, pending = 0.0, moved = 0.0;
+    double dilation = *p.dilation, pending = 0.0, moved = 0.0, length2 = 0.0;
     std::int64_t until = p.lag;
     for (std::int64_t c = 0; c < p.count; ++c) {
         Disk& body_i = bodies[p.first[c]];
@@ -87,6 +87,7 @@ double sweep_disks(const Problem& p) {
         const double new_t = std::min(std::max(stick, -most), most);
         const double d_n = new_n - p_n, d_t = new_t - p_t;
         moved += d_n * d_n + d_t * d_t;
+        length2 += new_n * new_n + new_t * new_t;
         impulse_n[c] = new_n;
         impulse_t[c] = new_t;
         const double fx = d_n * nx - d_t * ny, fy = d_n * ny + d_t * nx, turn = kappa * d_t;
@@ -104,7 +105,8 @@ double sweep_disks(const Problem& p) {
             pending = 0.0;
         }
     }
-    *p.dilation = dilation + pending;
+    p.dilation[0] = dilation + pending;
+    p.dilation[1] = length2;
     return moved;
 }
 
@@ -118,7 +120,7 @@ double sweep_spheres(const Problem& p) {
     Vector* __restrict before_t = reinterpret_cast<Vector*>(p.before_t);
     const double beta = p.beta;
     const double eps = p.eps, kappa = p.kappa, w_cell = p.w_cell;
-    double dilation = *p.dilation, pending = 0.0, moved = 0.0;
+    double dilation = *p.dilation, pending = 0.0, moved = 0.0, length2 = 0.0;
     std::int64_t until = p.lag;
     for (std::int64_t c = 0; c < p.count; ++c) {
         Sphere& body_i = bodies[p.first[c]];
@@ -142,6 +144,7 @@ double sweep_spheres(const Problem& p) {
         const double d_n = new_n - p_n;
         const Vector d_t = new_t - p_t;
         moved += d_n * d_n + dot(d_t, d_t);
+        length2 += new_n * new_n + dot(new_t, new_t);
         impulse_n[c] = new_n;
         impulse_t[c] = new_t;
         const Vector push = d_n * n + d_t, turn = kappa * cross(n, d_t);
@@ -156,7 +159,8 @@ double sweep_spheres(const Problem& p) {
             pending = 0.0;
         }
     }
-    *p.dilation = dilation + pending;
+    p.dilation[0] = dilation + pending;
+    p.dilation[1] = length2;
     return moved;
 }
 
