@@ -200,8 +200,8 @@ def test_numbers_that_contradict_the_file_are_named(tmp_path: Path) -> None:
 
 def test_mangled_files(tmp_path: Path) -> None:
     restart = _restart(tmp_path / "new.restart")
-    check_truncations(restart, lambda: granufab.read(restart, format="mercury-restart"))
-    refused = check_mutations(restart, lambda: granufab.read(restart, format="mercury-restart"))
+    check_truncations(restart, lambda: granufab.read(restart, format="mercury_restart"))
+    refused = check_mutations(restart, lambda: granufab.read(restart, format="mercury_restart"))
     assert refused > 20
     data, fstat = _data_2d(tmp_path)
     assert check_truncations(data, lambda: granufab.read(data, format="mercury")) > 20

@@ -190,5 +190,5 @@ def _open(paths: Sequence[Path], options: ReadOptions) -> Source:
 
 
 FORMAT = ForeignFormat(
-    key="mercury-restart", name="MercuryDPM restart", matches=_matches, open=_open
+    key="mercury_restart", name="MercuryDPM restart", matches=_matches, open=_open
 )
