@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         compress,
         prepare,
         random_sample,
+        relax,
         run,
         run_case,
         shear,
@@ -43,6 +44,7 @@ except PackageNotFoundError:  # used from its source tree without installing
 _HOME = {
     "random_sample": "simulate",
     "compress": "simulate",
+    "relax": "simulate",
     "prepare": "simulate",
     "shear": "simulate",
     "run": "simulate",
@@ -93,6 +95,7 @@ __all__ = [
     "prepare",
     "random_sample",
     "read",
+    "relax",
     "reproduce",
     "run",
     "run_case",

@@ -9,15 +9,14 @@ from __future__ import annotations
 import functools
 import inspect
 import sys
-import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from granufab.errors import InvalidSettings, MissingData
+from granufab.errors import InvalidSettings
 
 if TYPE_CHECKING:
     from granufab.history import Run
@@ -66,13 +65,20 @@ class ForeignOptions:
             InvalidSettings: a value cannot be read.
             MissingData: there is no such file of columns.
         """
+        from granufab.io import read_column_map
+
         given = {field.name: getattr(self, field.name) for field in fields(self)}
         chosen = {name: value for name, value in given.items() if value not in (None, False)}
         if self.cell is not None:
             chosen["cell"] = _numbers("--cell", self.cell)
         if self.columns is not None:
-            chosen["columns"] = _column_map(self.columns)
+            chosen["columns"] = read_column_map(self.columns)
         return chosen
+
+    def plain(self) -> dict[str, Any]:
+        """What was given as plain data, as the section ``sample.read`` of a case holds it."""
+        chosen = {name: value for name, value in self.keywords().items() if name != "columns"}
+        return chosen if self.columns is None else {**chosen, "columns": str(self.columns)}
 
 
 def _numbers(option: str, text: str) -> tuple[float, ...]:
@@ -82,28 +88,24 @@ def _numbers(option: str, text: str) -> tuple[float, ...]:
         raise InvalidSettings(f"{option} {text!r}: give numbers with commas between") from None
 
 
-def _column_map(file: Path) -> dict[str, dict[str, Any]]:
-    try:
-        found = tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise MissingData(f"{file}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InvalidSettings(f"{file}: is not TOML ({error})") from None
-    for name, section in found.items():
-        if not isinstance(section, dict):
-            raise InvalidSettings(f"{file}: {name} stands outside a section such as [grains]")
-    return found
+def foreign_options(
+    command: Callable[..., None], only: Collection[str] | None = None
+) -> Callable[..., None]:
+    """Give a verb the options of :class:`ForeignOptions`; it receives them as ``foreign``.
 
-
-def foreign_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a verb the options of :class:`ForeignOptions`; it receives them as ``foreign``."""
+    Args:
+        command: the verb.
+        only: names of the options that it takes; default all.
+    """
     hints = get_type_hints(ForeignOptions, include_extras=True)
+    hints = {name: hint for name, hint in hints.items() if only is None or name in only}
     added = [
         inspect.Parameter(
             field.name, inspect.Parameter.KEYWORD_ONLY, default=field.default,
             annotation=hints[field.name],
         )
         for field in fields(ForeignOptions)
+        if field.name in hints
     ]  # fmt: skip
     own_hints = get_type_hints(command, include_extras=True)
     own = [

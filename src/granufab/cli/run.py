@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from granufab.errors import GranufabError
+from granufab.cli.foreign import ForeignOptions, foreign_options
+from granufab.errors import GranufabError, InvalidSettings
 
 if TYPE_CHECKING:
     from granufab.history import Run
@@ -17,11 +20,27 @@ if TYPE_CHECKING:
 __all__ = ["run", "solver_pairs"]
 
 
+READING = ("format", "dimension", "cell", "periodic", "columns", "radius", "walls")
+"""Options of foreign data that tell how a starting state is read."""
+
+
+@partial(foreign_options, only=READING)
 def run(
-    case: Annotated[Path, typer.Argument(metavar="CASE.toml", help="The case, see granufab new.")],
+    foreign: ForeignOptions,
+    case: Annotated[
+        Path | None, typer.Argument(metavar="CASE.toml", help="The case, see granufab new.")
+    ] = None,
+    start: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE",
+            help="Start from the last state of this run file or of other programs' data "
+            "(repeat for files that complete each other); soft grains are relaxed first.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Folder; default CASE.toml without its ending."),
+        typer.Option(metavar="DIR", help="Folder; default CASE.toml or FILE without its ending."),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Random seed, instead of the file's.")] = None,
     set_: Annotated[
@@ -36,19 +55,46 @@ def run(
     from granufab.cli.output import print_pairs
     from granufab.cli.progress import show_progress
     from granufab.reproduce.case_folder import run_into_folder
-    from granufab.simulate.settings import load_case
 
     overrides = (*(set_ or ()), *(() if seed is None else (f"sample.seed={seed}",)))
-    settings = load_case(case, overrides)
-    folder = case.with_suffix("") if out is None else out
+    settings = _settings(case, start or [], foreign, overrides)
+    folder = out or _default_folder(case, start or [])
     with show_progress(gentle=True) as progress:
         result = run_into_folder(settings, folder, force=force, progress=progress)
+    for line in result.summary.get("start", {}).get("notes", ()):
+        print(f"granufab: start: {line}", file=sys.stderr)
     pairs = [*_fabric_pairs(settings, result), *solver_pairs(result.summary)]
     print_pairs(result.name, [*pairs, ("files in", folder)])
     for warning in result.summary.get("warnings", ()):
         print(f"warning: {warning}")
     if result.summary.get("interrupted"):
         raise KeyboardInterrupt
+
+
+def _settings(
+    file: Path | None, start: list[Path], foreign: ForeignOptions, overrides: tuple[str, ...]
+) -> Case:
+    """The case of a file and the options; without a file the default path from a given state."""
+    from granufab.simulate.settings import load_case
+
+    if file is None and not start:
+        raise InvalidSettings("give CASE.toml (granufab new shear > CASE.toml), or --start FILE")
+    given: dict[str, Any] = {}
+    if file is None:
+        given["name"] = start[0].stem
+    reading = foreign.plain()
+    if start:
+        given["sample"] = {"file": [str(path) for path in start], "read": reading}
+    elif reading:
+        raise InvalidSettings(f"--{next(iter(reading))} tells how --start FILE is read; give both")
+    return load_case(file, overrides, given)
+
+
+def _default_folder(case: Path | None, start: list[Path]) -> Path:
+    folder = (case or start[0]).with_suffix("")
+    if (folder.exists() and not folder.is_dir()) or (case is None and folder == start[0]):
+        folder = folder.with_name(folder.name + "-run")
+    return folder
 
 
 def _fabric_pairs(case: Case, result: Run) -> list[tuple[str, Any]]:

@@ -1,5 +1,6 @@
 """Files: the run file, series as CSV, datasets as CSV or NetCDF, summaries as JSON, FCLIB."""
 
+from granufab.io.column_map import read_column_map
 from granufab.io.fclib import read_fclib, read_fclib_guesses, read_fclib_solution, write_fclib
 from granufab.io.foreign_run import ForeignFrames
 from granufab.io.formats import FORMATS, Format, detect, format_of, read
@@ -27,6 +28,7 @@ __all__ = [
     "json_text",
     "provenance",
     "read",
+    "read_column_map",
     "read_fclib",
     "read_fclib_guesses",
     "read_fclib_solution",

@@ -70,6 +70,7 @@ def _assembled(found: FoundFrame, options: ReadOptions, summary: ImportSummary) 
             contacts = _contacts(listed, grains, cell, options, summary)
         except InvalidPacking as error:
             raise CorruptFile(f"{listed.place}: {error}") from None
+    summary.round_grains = found.round
     summary.grains, summary.frames_read = grains.count, summary.frames_read + 1
     summary.contacts = None if contacts is None else contacts.count
     if contacts is not None:

@@ -21,6 +21,7 @@ class ImportSummary:
         walls_dropped, wall_contacts_dropped, duplicates_dropped, self_contacts_dropped: of all
             frames read.
         rattlers: grains with fewer than two contacts in the frame read last, or None.
+        round_grains: False where grains are neither disks nor spheres.
         conventions: what the normals, forces and dimensions turned out to be, by topic.
         unknown_columns: of the files, not understood.
         notes: of the reader.
@@ -38,6 +39,7 @@ class ImportSummary:
     duplicates_dropped: int = 0
     self_contacts_dropped: int = 0
     rattlers: int | None = None
+    round_grains: bool = True
     conventions: dict[str, str] = field(default_factory=dict)
     unknown_columns: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from granufab.errors import GranufabError, InvalidSettings, MissingData
+from granufab.errors import GranufabError, InvalidSettings
 from granufab.history import Run
 from granufab.io import RunFileWriter, read, write_json, write_series, write_text
-from granufab.packing import Packing
+from granufab.reproduce.start_state import find_start
 from granufab.simulate.settings import Case, to_toml
 
 __all__ = ["RUN_FILES", "Progress", "RunCase", "check_writable", "read_run", "run_into_folder"]
@@ -38,8 +39,9 @@ def run_into_folder(
     """Run a case and leave ``run.h5 settings.toml series.csv summary.json`` in a folder.
 
     The run file grows frame by frame while the case runs, so an interrupted run can be read.
-    With ``sample.file`` the path starts from the last frame of that run file; the settings
-    written beside the results hold its grain count.
+    With ``sample.file`` the path starts from a state of a run file or of another program's data
+    (:func:`granufab.reproduce.start_state.find_start`); the settings written beside the results
+    hold its dimension, grain count and pressure, the summary what was done to it (``start``).
 
     Args:
         case: what to simulate.
@@ -56,8 +58,6 @@ def run_into_folder(
         GranufabError: ``sample.file`` cannot be read, or does not fit the case.
     """
     folder = Path(folder)
-    if start is None and case.sample.file is not None:
-        case, start = _start_from_file(case, folder)
     held = [name for name in RUN_FILES if (folder / name).exists()]
     if held and not force:
         raise InvalidSettings(
@@ -65,6 +65,10 @@ def run_into_folder(
             "choose another folder, or --force to replace it"
         )
     check_writable(folder)
+    found = None
+    if start is None and case.sample.file is not None:
+        found = find_start(case, folder, progress)
+        case, start = found.case, found.packing
     simulate = run_case or _simulator()
     given = {} if start is None else {"start": start}
     for name in held:
@@ -75,6 +79,8 @@ def run_into_folder(
     try:
         with recorder:
             run = simulate(case, record=recorder, progress=progress, **given)
+            if found is not None:
+                run = replace(run, summary={**run.summary, "start": found.summary})
             recorder.close(None if run.summary.get("interrupted") else run.summary)
     except BaseException:
         if recorder.frame_count == 0:  # nothing worth keeping: a rerun needs no force
@@ -84,24 +90,6 @@ def run_into_folder(
     write_series(run.series, folder / "series.csv", case.name)
     write_json(_summary(case, run), folder / "summary.json")
     return run
-
-
-def _start_from_file(case: Case, folder: Path) -> tuple[Case, Packing]:
-    """The case with the grain count of the last frame of ``sample.file``, and that frame."""
-    file = Path(str(case.sample.file))
-    if file.resolve() == (folder / "run.h5").resolve():
-        raise InvalidSettings(f"sample.file {file}: is the file to be written; give another --out")
-    frames = read(file).frames
-    if len(frames) == 0:
-        raise MissingData(f"sample.file {file}: holds no frame to start from")
-    packing = frames[-1].packing
-    if packing.dimension != case.sample.dimension:
-        raise InvalidSettings(
-            f"sample.file {file}: holds a {packing.dimension}D state, "
-            f"sample.dimension is {case.sample.dimension}"
-        )
-    sample = case.sample.model_copy(update={"grain_count": packing.grains.count})
-    return case.model_copy(update={"sample": sample}), packing
 
 
 def _simulator() -> RunCase:

@@ -6,11 +6,13 @@ from granufab.simulate.local_residual import local_errors
 from granufab.simulate.local_solve import solve_local
 from granufab.simulate.paths import Step, run, run_case, shear
 from granufab.simulate.preparation import Prepared, compress, prepare
+from granufab.simulate.relaxation import HARD, Relaxed, overlaps, pressure_of, relax
 from granufab.simulate.sample import draw_radii, random_sample
 from granufab.simulate.settings import Case, Material, Record, Sample, Sizes, Solver, Stage
 from granufab.simulate.stepping import Simulation
 
 __all__ = [
+    "HARD",
     "Biaxial",
     "Case",
     "ConstantMean",
@@ -19,6 +21,7 @@ __all__ = [
     "Material",
     "Prepared",
     "Record",
+    "Relaxed",
     "Sample",
     "SimpleShear",
     "Simulation",
@@ -32,8 +35,11 @@ __all__ = [
     "local_errors",
     "local_form",
     "local_state",
+    "overlaps",
     "prepare",
+    "pressure_of",
     "random_sample",
+    "relax",
     "run",
     "run_case",
     "shear",

@@ -22,12 +22,16 @@ __all__ = ["MOST_CONTACTS", "group_of", "mend"]
 
 REST, WIDER = 0.05, 0.5
 """Share of the squared change left out of the first group, and by what it shrinks each time."""
-MOST_CONTACTS = 4000
+RINGS = 2
+MOST_CONTACTS = {2: 4000, 3: 1000}
+"""By dimension; factors of more would cost as much as thousands of sweeps."""
 NEWTON_STEPS, NEWTON_TOLERANCE = 15, 1e-10
 
 
 def group_of(problem: Problem, change: Array, before: int = 0) -> IntArray:
     """The contacts that hold most of the change, and all that touch their grains' neighbours.
+
+    In 3D, where that soon is the whole packing, fewer rings where the group would be too large.
 
     Args:
         problem: contacts of the step.
@@ -37,9 +41,18 @@ def group_of(problem: Problem, change: Array, before: int = 0) -> IntArray:
     order = np.argsort(change)[::-1]
     held = np.cumsum(change[order] ** 2)
     heart = order[: int(np.searchsorted(held, (1 - REST * WIDER**before) * held[-1])) + 1]
-    bodies = np.unique(np.concatenate([problem.first[heart], problem.second[heart]]))
-    ring = np.isin(problem.first, bodies) | np.isin(problem.second, bodies)
-    bodies = np.unique(np.concatenate([problem.first[ring], problem.second[ring]]))
+    group = heart
+    for _ in range(RINGS):
+        wider = _touching(problem, group)
+        if len(wider) > MOST_CONTACTS[problem.normal.shape[1]]:
+            break
+        group = wider
+    return np.sort(group)
+
+
+def _touching(problem: Problem, contacts: IntArray) -> IntArray:
+    """The contacts of all bodies of some contacts."""
+    bodies = np.unique(np.concatenate([problem.first[contacts], problem.second[contacts]]))
     return np.flatnonzero(np.isin(problem.first, bodies) | np.isin(problem.second, bodies))
 
 
@@ -55,7 +68,7 @@ def mend(problem: Problem, state: State, change: Array, before: int = 0) -> bool
         Whether anything was done: not for groups of more than ``MOST_CONTACTS`` contacts.
     """
     chosen = group_of(problem, change, before)
-    if not 0 < len(chosen) <= MOST_CONTACTS:
+    if not 0 < len(chosen) <= MOST_CONTACTS[problem.normal.shape[1]]:
         return False
     group = _part(problem, chosen)
     start = State(state.motion, state.rate, state.impulse_n[chosen], state.impulse_t[chosen])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -26,6 +27,7 @@ from granufab.simulate.settings_file import describe_error, read_toml
 __all__ = [
     "Case",
     "Material",
+    "Reading",
     "Record",
     "Sample",
     "Sizes",
@@ -70,8 +72,22 @@ class Sizes(_Settings):
         return self
 
 
+class Reading(_Settings):
+    """What a foreign starting state does not say itself; as the options of ``granufab.read``."""
+
+    format: str | None = Field(default=None, description="key of the format, else by the content")
+    dimension: Literal[2, 3] | None = Field(default=None, description="2 or 3 coordinates")
+    cell: tuple[float, ...] | None = Field(
+        default=None, description="edges of the box, or lower corner and edges"
+    )
+    periodic: str | None = Field(default=None, description='periodic axes, for example "xy"')
+    columns: str | None = Field(default=None, description="TOML file: what the columns hold")
+    radius: Positive | None = Field(default=None, description="of every grain")
+    walls: bool = Field(default=False, description="keep bodies of walls as grains")
+
+
 class Sample(_Settings):
-    """How the isotropic starting sample is made."""
+    """How the isotropic starting sample is made, or where the starting state comes from."""
 
     grain_count: Annotated[int, Field(ge=1, le=100_000_000)] = Field(
         default=2000, description="number of grains"
@@ -99,7 +115,11 @@ class Sample(_Settings):
     boundary: Literal["periodic", "walls"] = Field(
         default="periodic", description="periodic or walls"
     )
-    file: str | None = Field(default=None, description="start from the last frame of this run file")
+    file: str | tuple[str, ...] | None = Field(
+        default=None, description="start from a state of this run file, or of these foreign files"
+    )
+    frame: int = Field(default=-1, description="of the file, counted from 0; -1 is the last")
+    read: Reading = Reading()
     seed: Annotated[int, Field(ge=0)] = Field(default=1, description="random seed")
 
 
@@ -235,13 +255,12 @@ class Case(_Settings):
                 f"record.reach is {self.record.reach}, allowed up to solver.skin = "
                 f"{self.solver.skin}"
             )
+        sample = self.sample
+        known = sample.file is None or "dimension" in sample.model_fields_set
         for index, stage in enumerate(self.path):
-            if stage.axis >= self.sample.dimension:
-                raise ValueError(
-                    f"path.{index}.axis is {stage.axis}, allowed 0..{self.sample.dimension - 1}"
-                )
-            _check_dimension(stage, index, self.sample.dimension)
-            if self.sample.boundary == "walls" and stage.loading.startswith("simple-shear"):
+            if known:
+                _check_dimension(stage, index, sample.dimension)
+            if sample.boundary == "walls" and stage.loading.startswith("simple-shear"):
                 raise ValueError(
                     f"path.{index}.loading is {stage.loading}, which needs a periodic sample"
                 )
@@ -250,6 +269,8 @@ class Case(_Settings):
 
 def _check_dimension(stage: Stage, index: int, dimension: int) -> None:
     """A biaxial stage is 2D; a triaxial one and an intermediate strain rate b are 3D."""
+    if stage.axis >= dimension:
+        raise ValueError(f"path.{index}.axis is {stage.axis}, allowed 0..{dimension - 1}")
     needed = {"biaxial": 2, "triaxial": 3}.get(stage.loading, dimension)
     if needed != dimension:
         other = "triaxial" if dimension == 3 else "biaxial"
@@ -261,20 +282,27 @@ def _check_dimension(stage: Stage, index: int, dimension: int) -> None:
         raise ValueError(f"path.{index}.b is {stage.b:g}, which exists only in 3D; leave it out")
 
 
-def load_case(path: Path | str, overrides: tuple[str, ...] = ()) -> Case:
+def load_case(
+    path: Path | str | None,
+    overrides: tuple[str, ...] = (),
+    given: Mapping[str, Any] | None = None,
+) -> Case:
     """Read a case from a TOML file.
 
     Args:
-        path: the file.
+        path: the file; None takes the defaults.
         overrides: assignments ``section.key=value`` that win over the file.
+        given: values, or keys of a section, that win over the file, but not over ``overrides``.
     Raises:
         InvalidSettings: the file is missing, is no TOML, or holds a bad value.
     """
-    path = Path(path)
-    data = read_toml(path)
+    data = {} if path is None else read_toml(Path(path))
+    for name, value in (given or {}).items():
+        section = data.get(name)
+        data[name] = {**section, **value} if isinstance(section, dict) else value
     for text in overrides:
         _assign(data, text)
-    return parse_case(data, where=str(path))
+    return parse_case(data, where="settings" if path is None else str(path))
 
 
 def parse_case(data: dict[str, Any], *, where: str = "settings") -> Case:
@@ -305,7 +333,7 @@ def _assign(data: dict[str, Any], text: str) -> None:
                 raise InvalidSettings(f"--set {text}: there is no entry {section}")
             target = target[int(section)]
         else:
-            target = target.setdefault(section, [] if section == "path" else {})
+            target = target.setdefault(section, [{}] if section == "path" else {})
         if not isinstance(target, dict | list):
             raise InvalidSettings(f"--set {text}: {section} is a value, not a section")
     if isinstance(target, list):
@@ -348,5 +376,7 @@ def _value(value: object) -> str:
         return repr(value) if math.isfinite(value) else ("inf" if value > 0 else "-inf")
     if isinstance(value, int):
         return str(value)
+    if isinstance(value, tuple):
+        return f"[{', '.join(_value(item) for item in value)}]"
     text = str(value).replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     return f'"{text}"'
