@@ -123,6 +123,8 @@ class FrameSource(Protocol):
 
     def __len__(self) -> int: ...
 
+    def __iter__(self) -> Iterator[Frame]: ...
+
     def __getitem__(self, index: int, /) -> Frame: ...
 
 
@@ -170,8 +172,10 @@ class Run:
 
     def packings(self) -> Iterator[Packing]:
         """The states alone, one after another."""
-        for index in range(len(self.frames)):
-            yield self.frames[index].packing
+        for frame in self.frames:
+            packing = frame.packing
+            del frame  # before the next one is read
+            yield packing
 
 
 def frame_before(frames: FrameSource | Sequence[Frame], end: int, strain: float) -> Frame | None:

@@ -227,11 +227,7 @@ def _each(states: States) -> Iterator[State]:
         yield from states
     else:
         frames = states.frames if isinstance(states, Run) else states
-        if not hasattr(frames, "__getitem__"):
-            yield from frames  # pyright: ignore[reportGeneralTypeIssues]
-            return
-        for index in range(len(frames)):  # pyright: ignore[reportArgumentType]
-            yield frames[index]  # pyright: ignore[reportIndexIssue]
+        yield from frames
 
 
 def _origin(packing: Packing) -> Array:

@@ -164,12 +164,9 @@ def measure_run(
         MissingData: the run has no frames, or a frame holds nothing to measure.
         InvalidSettings: an unknown criterion or definition.
     """
-    if len(run.frames) == 0:
-        raise MissingData(f"run {run.name!r} has no recorded frames")
     rule, definition, fewest = run_definitions(run, criterion, z_definition, minimum)
     rows = []
-    for index in range(len(run.frames)):
-        frame = run.frames[index]
+    for frame in run.frames:
         row = measure(
             frame.packing,
             criterion=rule,
@@ -184,6 +181,8 @@ def measure_run(
             row |= _force_row(frame, run, rule, definition, fewest, direction)
         rows.append(row | _frame_values(frame))
         del frame  # before the next one is read
+    if not rows:
+        raise MissingData(f"run {run.name!r} has no recorded frames")
     attributes = {
         "path": run.name,
         "criterion": rule.text,
