@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from granufab.errors import MissingData
 from granufab.packing import Array, Packing
 
 if TYPE_CHECKING:
@@ -167,8 +168,14 @@ class Run:
 
     @property
     def dimension(self) -> int:
-        """2 or 3."""
-        return self.frames[0].packing.dimension
+        """2 or 3.
+
+        Raises:
+            MissingData: there are no frames.
+        """
+        for frame in self.frames:
+            return frame.packing.dimension
+        raise MissingData(f"run {self.name!r} has no recorded frames")
 
     def packings(self) -> Iterator[Packing]:
         """The states alone, one after another."""

@@ -180,8 +180,6 @@ def follow_run(
             yield frame.packing, lattice_change(frame)
 
     contacts = list(follow_contacts(states(), rule))
-    if not contacts:
-        raise MissingData(f"run {run.name!r} has no recorded frames")
     eps_q, eps_q_total, stage = zip(*place, strict=True)
     return FollowedRun(
         contacts=contacts,
