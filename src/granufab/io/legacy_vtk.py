@@ -70,6 +70,8 @@ def read_legacy_vtk(path: Path) -> VtkPoints:
     found, owner = VtkPoints(), "field"
     while text.more():
         owner = _section(text, found, owner)
+    if not text.pointed:
+        raise text.wrong("the file ends without POINTS")
     return found
 
 
@@ -79,6 +81,7 @@ def _section(text: _Text, found: VtkPoints, owner: str) -> str:
     word = words[0]
     if word == "POINTS":
         count = text.whole(words, 1)
+        text.pointed = True
         found.position = text.values(3 * count, words[2] if len(words) > 2 else "").reshape(-1, 3)
     elif word in _CELLS:
         lines = _read_cells(text, text.whole(words, 1), text.whole(words, 2))
@@ -152,7 +155,7 @@ class _Text:
 
     def __init__(self, path: Path) -> None:
         self.path, self.bytes, self.at = path, path.read_bytes(), 0
-        self.binary, self.items = False, 0
+        self.binary, self.items, self.pointed = False, 0, False
 
     def wrong(self, what: str) -> CorruptFile:
         return CorruptFile(f"{self.path}: byte {self.at}: {what}")

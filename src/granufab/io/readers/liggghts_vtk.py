@@ -76,6 +76,8 @@ def _frame(path: Path, contacts: Sequence[Path], options: ReadOptions) -> FoundF
 
 def _listed(path: Path, grains: FoundFrame) -> FoundContacts:
     found = read_legacy_vtk(path)
+    if len(found.position) and not (len(found.lines) and found.cells):
+        raise CorruptFile(f"{path}: has points without lines and their values; is it cut?")
     return line_contacts(
         str(path), found.position, found.lines, found.cells,
         position=grains.position, radius=grains.radius, number=grains.number,
@@ -117,12 +119,13 @@ def _numbers(column: Array | None, path: Path) -> np.ndarray | None:
 
 
 def _holds_contacts(path: Path) -> bool | None:
-    """Whether a file has values of lines instead of points; None where there are no points."""
+    """Whether a file has points for something else than grains; None where it has no points."""
+    if path.stat().st_size == 0:
+        return None
     with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        counted = re.search(rb"\nPOINTS[ \t]+(\d+)", data)
-        if counted is not None and int(counted[1]) == 0:
+        if re.search(rb"\nPOINTS[ \t]+0*[1-9]", data) is None:
             return None
-        return data.find(b"\nPOINT_DATA") < 0 and data.find(b"\nCELL_DATA") >= 0
+        return data.find(b"\nPOINT_DATA") < 0 and data.find(b"\nVERTICES") < 0
 
 
 def _families(paths: Sequence[Path]) -> tuple[list[Path], list[list[Path]]]:
@@ -130,14 +133,13 @@ def _families(paths: Sequence[Path]) -> tuple[list[Path], list[list[Path]]]:
     by_name: dict[str, list[Path]] = {}
     for path in sorted(paths, key=lambda path: (_step(path) or 0, path.name)):
         by_name.setdefault(f"{path.parent}/{re.sub(r'[0-9]+', '#', path.name)}", []).append(path)
-    grains: list[Path] = []
-    contacts: list[list[Path]] = []
+    kinds: dict[bool | None, list[list[Path]]] = {False: [], True: [], None: []}
     for family in by_name.values():
-        told = next((kind for kind in map(_holds_contacts, family) if kind is not None), False)
-        if told:
-            contacts.append(family)
-        else:
-            grains += family
+        told = (kind for kind in map(_holds_contacts, family) if kind is not None)
+        kinds[next(told, None)].append(family)
+    contacts = kinds[True]  # files without points are what lacks: grains, else contacts
+    (contacts if kinds[False] else kinds[False]).extend(kinds[None])
+    grains = [path for family in kinds[False] for path in family]
     return sorted(grains, key=lambda path: (_step(path) or 0, path.name)), contacts
 
 
