@@ -247,7 +247,8 @@ def _groups(files: Sequence[Path], keywords: dict[str, Any]) -> list[tuple[list[
             groups[-1][0].append(file)
         else:
             groups.append(([file], not own))
-        before = None if file.is_dir() else before if joins else known
+        keeps = joins and not _completes(before, known)
+        before = None if file.is_dir() else before if keeps else known
     return groups
 
 
@@ -258,10 +259,18 @@ def _belongs(file: Path, known: object, before: object) -> bool:
 
     if known is before or not isinstance(before, ForeignFormat) or isinstance(known, Format):
         return known is before
-    if isinstance(known, ForeignFormat) and known.key in before.completed_by:
+    if _completes(known, before) or _completes(before, known):
         return True
     with file.open("rb") as stream:
         return before.matches(file, stream.read(4096))
+
+
+def _completes(part: object, whole: object) -> bool:
+    """Whether files of one format belong to those of another."""
+    from granufab.io.foreign_format import ForeignFormat
+
+    both = isinstance(part, ForeignFormat) and isinstance(whole, ForeignFormat)
+    return both and part.key in whole.completed_by
 
 
 def print_summaries(opened: Sequence[Opened]) -> None:
