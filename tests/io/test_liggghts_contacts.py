@@ -13,7 +13,7 @@ import pytest
 from mangling import check_mutations, check_truncations
 
 import granufab
-from granufab.errors import CorruptFile, MissingData
+from granufab.errors import CorruptFile, InvalidSettings, MissingData
 
 CENTRE = np.array([[0.0, 0, 0.5], [0.9, 0, 0.5], [0.9, 0.95, 0.5], [5.0, 5, 5]])
 RADIUS = 0.5
@@ -209,3 +209,63 @@ def test_the_command_takes_them(tmp_path: Path, capsys: pytest.CaptureFixture[st
     states = json.loads(capsys.readouterr().out)
     assert [state["z"] for state in states] == [1.0, 1.0]
     assert [state["criterion"] for state in states] == ["force", "force"]
+
+
+def _local(path: Path, name: str, rows: list[list[float]], step: int = 0) -> str:
+    columns = " ".join(f"c_{name}[{k}]" for k in range(1, len(rows[0]) + 1))
+    text = (
+        f"ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ENTRIES\n{len(rows)}\nITEM: BOX BOUNDS ff ff ff\n"
+        + "-9 9\n" * 3 + f"ITEM: ENTRIES {columns} \n"
+    )  # fmt: skip
+    text += "".join(" ".join(f"{value:.15g}" for value in row) + " \n" for row in rows)
+    path.write_text(text)
+    return text
+
+
+def _dumps(folder: Path) -> list[Path]:
+    """Atoms, contacts of grains (pos id force) and with walls (mesh, triangle, grain)."""
+    atoms, pairs, walls = (folder / name for name in ("atoms", "pairs", "walls"))
+    atoms.write_text(
+        f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n{len(CENTRE)}\nITEM: BOX BOUNDS ff ff ff\n"
+        + "-9 9\n" * 3 + "ITEM: ATOMS id x y z radius\n"
+        + "".join(f"{k} {x} {y} {z} {RADIUS}\n"
+                  for k, (x, y, z) in zip(NUMBER, CENTRE, strict=True))
+    )  # fmt: skip
+    _local(pairs, "p", [[*row[0], *row[1], row[2], row[3], 0, *row[4]] for row in _rows()])
+    _local(walls, "w", [
+        [*row[0], *row[1], row[2], row[3], grain, *row[4]]
+        for row, grain in zip(_walls(), NUMBER, strict=False)
+    ])  # fmt: skip
+    return [atoms, pairs, walls]
+
+
+def test_local_dumps_of_grains_and_walls(tmp_path: Path) -> None:
+    atoms, pairs, walls = _dumps(tmp_path)
+    told = {"contacts": {"order": "pos id force"}}
+    for files in ((atoms, pairs, walls), (walls, pairs, atoms)):
+        run = granufab.read(*files, columns=told)
+        packing = run.frames[0].packing
+        assert packing.contacts is not None and packing.contacts.force is not None
+        forces = {
+            (int(NUMBER[i]), int(NUMBER[j])): force
+            for (i, j), force in zip(packing.contacts.pair, packing.contacts.force, strict=True)
+        }
+        assert set(forces) == set(PAIRS)
+        for pair, push in zip(PAIRS, PUSH, strict=True):
+            np.testing.assert_allclose(forces[pair], -push)
+        assert run.frames.summary.wall_contacts_dropped == 3  # type: ignore[union-attr]
+
+
+def test_walls_with_columns_of_their_own(tmp_path: Path) -> None:
+    atoms, pairs, walls = _dumps(tmp_path)
+    rows = [[0, row[3], grain, *row[4], 0.01]
+            for row, grain in zip(_walls(), NUMBER, strict=False)]  # fmt: skip
+    _local(walls, "w", rows)
+    told = {"contacts": {"order": "pos id force"}}
+    with pytest.raises(InvalidSettings, match="gives 12 columns, but the file has 7"):
+        granufab.read(atoms, pairs, walls, columns=told)
+    run = granufab.read(
+        atoms, pairs, walls, columns=told | {"walls": {"order": "id force contactArea"}}
+    )
+    assert run.frames[0].packing.contacts.count == 2  # type: ignore[union-attr]
+    assert run.frames.summary.wall_contacts_dropped == 3  # type: ignore[union-attr]
