@@ -234,6 +234,26 @@ def test_every_format_follows_the_rule(tmp_path: Path, made: Callable[[Path], li
     assert files[0].stem[0] in skipped[0]["reason"]
 
 
+@pytest.mark.parametrize("count", ["x", "4", "2", "999999", ""])
+def test_a_lost_beginning_in_xyz(tmp_path: Path, count: str) -> None:
+    """The count of rows of frame 1 is damaged; later frames are found by their comments."""
+    (path,) = _xyz(tmp_path)
+    lines = path.read_text().replace("half", "0.5").split("\n")
+    assert lines[5] == "3"
+    lines[5] = count
+    path.write_text("\n".join(lines))
+    assert granufab.read(path).frames[0].packing.grains.count == 3
+    with pytest.raises(CorruptFile, match=r"a\.xyz: .*skip_damaged"):
+        list(granufab.read(path).frames)
+    run = granufab.read(path, skip_damaged=True, strain=0.1)
+    lost = [1, 2] if count == "4" else [1]  # a row too many is the next frame's beginning
+    kept = [k for k in range(4) if k not in lost]
+    assert [frame.packing.time for frame in run.frames] == kept
+    assert [frame.eps_q for frame in run.frames] == pytest.approx([0.1 * k for k in kept])
+    summary = run.frames.summary  # type: ignore[union-attr]
+    assert [one["frame"] for one in summary.skipped_frames] == lost
+
+
 def test_the_photoelastic_sample() -> None:
     run = granufab.read(sample("rigidlib", "DataAnnulus_1"), skip_damaged=True)
     frames: list[Frame] = list(run.frames)

@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from granufab.errors import InvalidPacking, InvalidSettings
 from granufab.fabric.coordination import ZDefinition, coordination, counted_contacts
@@ -221,6 +220,8 @@ def _nearest_normals(
     before: Array, after: Array, first: IntArray, second: IntArray, shared: IntArray
 ) -> Iterator[IntArray]:
     """Rows, before and after, of the points that two grains share, for each of these labels."""
+    from scipy.optimize import linear_sum_assignment  # slow to import: only for such grains
+
     orders = [np.argsort(part, kind="stable") for part in (first, second)]
     begin, end = (
         [np.searchsorted(part, shared, side=side, sorter=order)
