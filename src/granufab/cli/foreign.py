@@ -269,8 +269,9 @@ def _completes(part: object, whole: object) -> bool:
     """Whether files of one format belong to those of another."""
     from granufab.io.foreign_format import ForeignFormat
 
-    both = isinstance(part, ForeignFormat) and isinstance(whole, ForeignFormat)
-    return both and part.key in whole.completed_by
+    if not isinstance(part, ForeignFormat) or not isinstance(whole, ForeignFormat):
+        return False
+    return part.key in whole.completed_by
 
 
 def print_summaries(opened: Sequence[Opened]) -> None:

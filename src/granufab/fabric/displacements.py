@@ -227,7 +227,11 @@ def _each(states: States) -> Iterator[State]:
         yield from states
     else:
         frames = states.frames if isinstance(states, Run) else states
-        yield from frames
+        if hasattr(frames, "__iter__"):
+            yield from frames
+            return
+        for index in range(len(frames)):  # pyright: ignore[reportArgumentType]
+            yield frames[index]  # pyright: ignore[reportIndexIssue]
 
 
 def _origin(packing: Packing) -> Array:
