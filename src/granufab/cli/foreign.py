@@ -61,7 +61,7 @@ class ForeignOptions:
     axis: Annotated[str | None, _option("Contraction axis of a'.", "x|y|z|a,b,c")] = None
     walls: Annotated[bool, _option("Keep bodies of walls as grains.", None, "--walls")] = False
     frames: Annotated[
-        str | None, _option("Part of the series; Python's A:B:STEP.", "A:B[:STEP]")
+        str | None, _option("Part of the series, as Python counts slices.", "A:B[:STEP]")
     ] = None
     skip_damaged: Annotated[
         bool, _option("Leave out frames that cannot be read, and list them.", None,
