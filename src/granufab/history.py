@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from granufab.errors import MissingData
 from granufab.packing import Array, Packing
 
 if TYPE_CHECKING:
@@ -123,6 +124,8 @@ class FrameSource(Protocol):
 
     def __len__(self) -> int: ...
 
+    def __iter__(self) -> Iterator[Frame]: ...
+
     def __getitem__(self, index: int, /) -> Frame: ...
 
 
@@ -165,13 +168,21 @@ class Run:
 
     @property
     def dimension(self) -> int:
-        """2 or 3."""
-        return self.frames[0].packing.dimension
+        """2 or 3.
+
+        Raises:
+            MissingData: there are no frames.
+        """
+        for frame in self.frames:
+            return frame.packing.dimension
+        raise MissingData(f"run {self.name!r} has no recorded frames")
 
     def packings(self) -> Iterator[Packing]:
         """The states alone, one after another."""
-        for index in range(len(self.frames)):
-            yield self.frames[index].packing
+        for frame in self.frames:
+            packing = frame.packing
+            del frame  # before the next one is read
+            yield packing
 
 
 def frame_before(frames: FrameSource | Sequence[Frame], end: int, strain: float) -> Frame | None:

@@ -9,28 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from foreign_tables import CELL, STEP, sheared_squares
 
 SAMPLES = Path(os.environ.get("GRANUFAB_SAMPLES", Path(__file__).parents[3] / "shared/samples"))
-STEP = 0.02
-
-
-def sheared_squares(folder: Path, frames: int = 24) -> tuple[Path, Path]:
-    """A periodic 4 × 4 lattice of disks in tables; along y every fourth contact goes one by one."""
-    grains, contacts = ["frame,id,x,y,r"], ["frame,i,j,fn,ft"]
-    for frame in range(frames):
-        for k in range(16):
-            grains.append(f"{frame},{k + 1},{k // 4 + 0.5},{k % 4 + 0.5},0.5")
-        for k in range(16):
-            contacts.append(f"{frame},{k + 1},{(k + 4) % 16 + 1},-1,0")
-            if k >= frame // 2:
-                contacts.append(f"{frame},{k + 1},{k // 4 * 4 + (k + 1) % 4 + 1},-2,0.5")
-    paths = (folder / "grains.csv", folder / "contacts.csv")
-    for path, lines in zip(paths, (grains, contacts), strict=True):
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return paths
-
-
-CELL = ("--cell", "0,0,4,4", "--periodic", "xy")
 
 
 def test_files_that_complete_each_other_are_one_series(granufab, tmp_path: Path) -> None:
@@ -172,9 +153,15 @@ def test_import_refuses_grains_that_change(granufab, tmp_path: Path) -> None:
     table = tmp_path / "growing.csv"
     table.write_text("frame,id,x,y,r\n0,1,0,0,1\n1,1,0,0,1\n1,2,3,3,1\n")
     done = granufab("import", table, "-o", tmp_path / "new.h5")
-    assert done.code == 2
-    assert "frame 1" in done.err
+    assert (done.code, done.out) == (2, "")
+    assert len(done.err.splitlines()) == 1
+    assert "frame 1 has 2 grains in 2D, but the run began with 1 in 2D" in done.err
+    assert "import --frames 0:1 or a later part" in done.err
     assert not (tmp_path / "new.h5").exists()
+    for part in ("0:1", "1:"):
+        done = granufab("import", table, "--frames", part, "-o", tmp_path / f"{part[0]}.h5")
+        assert done.code == 0, done.err
+    assert json.loads(granufab("info", tmp_path / "1.h5", "--json").out)["grain_count"] == 2
 
 
 def test_export_and_back(granufab, tmp_path: Path, run_file: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -269,6 +270,28 @@ def test_hdf5_says_what_the_text_says(tmp_path: Path, shift: int) -> None:
         one, two = getattr(got.contacts, name)[order[0]], getattr(wanted.contacts, name)[order[1]]
         np.testing.assert_allclose(one, two, atol=1e-8)
     assert (run.frames[0].packing.time, run.frames[1].packing.time) == (0.5, 1.0)
+
+
+@pytest.mark.parametrize("bodies_first", [False, True])
+def test_hdf5_and_bodies_are_one_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], bodies_first: bool
+) -> None:
+    """Nothing but the two files is given, in either order, to Python and the command line."""
+    from granufab.cli import main
+
+    files = [_hdf5(tmp_path / "lmgc90.h5", 1, 3), _bodies(tmp_path / "BODIES.DAT")]
+    files = files[::-1] if bodies_first else files
+    run = granufab.read(*files)
+    assert run.settings["format"] == "LMGC90 HDF5"
+    assert len(run.frames) == 3
+    with pytest.raises(SystemExit) as done:
+        main(["measure", *map(str, files), "--json", "--z-definition", "z"])
+    assert done.value.code == 0
+    states = json.loads(capsys.readouterr().out)
+    assert [state["frame"] for state in states] == [0, 1, 2]
+    for state in states:  # three pairs are listed, two bear; body 4 is a wall
+        assert (state["grain_count"], state["contact_count"]) == (3, 2)
+        assert state["z"] == pytest.approx(4 / 3)
 
 
 def test_hdf5_without_bodies_names_them(tmp_path: Path) -> None:

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from granufab.cli.choices import Definition
-from granufab.cli.foreign import ForeignOptions, foreign_options, open_run, print_summaries
+from granufab.cli.foreign import (
+    ForeignOptions,
+    foreign_options,
+    frame_numbers,
+    open_run,
+    print_summaries,
+)
 from granufab.cli.output_files import check_figure, check_table
 from granufab.errors import MissingData
 
@@ -85,6 +91,8 @@ def balance(
 
     JSON and FILE hold every interval; the figure and the mean rates are over the window.
     """
+    import numpy as np
+
     from granufab.cli.output import print_json, print_rows
     from granufab.fabric import balance_run
 
@@ -100,6 +108,9 @@ def balance(
         bins=bins,
         keep=keep,
     )
+    numbers = np.array(frame_numbers(opened.run))
+    for end in ("frame_before", "frame_after"):
+        table[end] = table[end].copy(data=numbers[table[end].values])
     print_summaries([opened])
     if out is not None:
         _write(table, out)
@@ -108,7 +119,7 @@ def balance(
 
         cast("Figure", plots.balance(table, window=window)[0].figure).savefig(figure, dpi=300)
     if json:
-        print_json(list(_intervals(run, table)))
+        print_json([row | opened.skipped() for row in _intervals(run, table)])
         return
     kept = "" if keep is None else f", kept to a gap of {keep:g} d"
     title = f"{run}; contacts: {table.attrs['criterion']}{kept}; rates per grain and unit strain"

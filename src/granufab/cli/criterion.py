@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from granufab.cli.choices import Definition
-from granufab.cli.foreign import ForeignOptions, foreign_options, open_run, print_summaries
+from granufab.cli.foreign import (
+    ForeignOptions,
+    foreign_options,
+    frame_numbers,
+    frame_place,
+    open_run,
+    print_summaries,
+)
 from granufab.cli.output_files import check_figure
 from granufab.errors import InvalidSettings
 
@@ -60,11 +67,12 @@ def criterion(
         raise InvalidSettings(f"--bootstrap {bootstrap}: must be >= 0")
     opened = open_run(files, foreign)
     run, loaded = opened.name, opened.run
+    place = frame_place(loaded, run, frame)
     curves = criterion_curves(
-        loaded, frame=frame, window=window, z_definition=z_definition, bootstrap=bootstrap
+        loaded, frame=place, window=window, z_definition=z_definition, bootstrap=bootstrap
     )
     print_summaries([opened])
-    entry = _entry(run, loaded, frame, window, curves)
+    entry = _entry(run, loaded, place, window, curves) | opened.skipped()
     if json:
         print_json(entry)
     else:
@@ -80,12 +88,12 @@ def criterion(
         cast("Figure", draw(curves)[0].figure).savefig(output, dpi=300)
 
 
-def _entry(source: str, run: Run, frame: int, window: float, curves: xr.Dataset) -> dict[str, Any]:
+def _entry(source: str, run: Run, place: int, window: float, curves: xr.Dataset) -> dict[str, Any]:
     """The curves as plain lists, one object per kind of threshold."""
     entry: dict[str, Any] = {
         "source": source,
-        "frame": frame % len(run.frames),
-        "eps_q": run.frames[frame].eps_q,
+        "frame": frame_numbers(run)[place],
+        "eps_q": run.frames[place].eps_q,
         "window": window,
         **{name: curves.attrs[name] for name in ("z_definition", "minimum_contacts")},
         **{name: curves.attrs[name] for name in ("anisotropy", "state_count", "error_bars")},

@@ -8,8 +8,13 @@ from typing import Annotated, Any
 
 import typer
 
-from granufab.cli.foreign import ForeignOptions, foreign_options, open_run, print_summaries
-from granufab.errors import InvalidSettings
+from granufab.cli.foreign import (
+    ForeignOptions,
+    foreign_options,
+    frame_place,
+    open_run,
+    print_summaries,
+)
 
 __all__ = ["export"]
 
@@ -40,10 +45,7 @@ def export(
     opened = open_run(files, replace(foreign, format=input_format))
     what: Any = opened.run
     if frame is not None:
-        count = len(opened.run.frames)
-        if not -count <= frame < count:
-            raise InvalidSettings(f"--frame {frame}: {opened.name} holds frames 0..{count - 1}")
-        what = opened.run.frames[frame].packing
+        what = opened.run.frames[frame_place(opened.run, opened.name, frame)].packing
     written = write(what, out, format=format, force=force)
     print_summaries([opened])
     print(f"wrote {', '.join(str(file) for file in written)}")

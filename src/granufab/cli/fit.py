@@ -76,6 +76,10 @@ def fit(
         "z_definition": definition,
         "series": [str(file) for file in series],
     }
+    if foreign.skip_damaged:
+        entry["skipped_frames"] = [
+            one for path in paths for one in path.attrs.get("skipped_frames", ())
+        ]
     law = None
     if evolution is not None:
         law = fit_law(paths, found, definition, form)
@@ -146,7 +150,7 @@ def _measured_series(files: Sequence[Path], foreign: ForeignOptions) -> list[xr.
     from granufab.reproduce.symmetry import described_series
 
     opened = open_runs(files, foreign, own=("dimension",))
-    tables = [described_series(with_series(one.run)) for one in opened]
+    tables = [described_series(with_series(one.run)).assign_attrs(one.skipped()) for one in opened]
     print_summaries(opened)
     for one, table in zip(opened, tables, strict=True):
         if one.summary is not None and bool(table["eps_q"].isnull().all()):

@@ -25,6 +25,8 @@ __all__ = [
     "ForeignOptions",
     "Opened",
     "foreign_options",
+    "frame_numbers",
+    "frame_place",
     "open_run",
     "open_runs",
     "print_summaries",
@@ -57,6 +59,13 @@ class ForeignOptions:
     strain: Annotated[float | None, _option("ε_q from a frame to the next.", "STEP")] = None
     axis: Annotated[str | None, _option("Contraction axis of a'.", "x|y|z|a,b,c")] = None
     walls: Annotated[bool, _option("Keep bodies of walls as grains.", None, "--walls")] = False
+    frames: Annotated[
+        str | None, _option("Part of the series, as Python counts slices.", "A:B[:STEP]")
+    ] = None
+    skip_damaged: Annotated[
+        bool, _option("Leave out frames that cannot be read, and list them.", None,
+                      "--skip-damaged")
+    ] = False  # fmt: skip
 
     def keywords(self) -> dict[str, Any]:
         """Keywords of :func:`granufab.read`, what was not given left out.
@@ -135,10 +144,12 @@ class Opened:
     Attributes:
         files: one run file, or foreign files that belong together.
         run: its frames are read when asked for.
+        skips: damaged frames are left out.
     """
 
     files: tuple[Path, ...]
     run: Run
+    skips: bool = False
 
     @property
     def name(self) -> str:
@@ -149,6 +160,11 @@ class Opened:
     def summary(self) -> Any:
         """The import summary of foreign data, or None."""
         return getattr(self.run.frames, "summary", None)
+
+    def skipped(self) -> dict[str, Any]:
+        """The JSON entry of damaged frames, where the user let them be skipped."""
+        frames = self.summary.skipped_frames if self.summary is not None else []
+        return {"skipped_frames": list(frames)} if self.skips else {}
 
 
 def open_runs(
@@ -170,12 +186,39 @@ def open_runs(
     groups = _groups(files, keywords)
     vain = [name for name in keywords if name not in own]
     if vain and not any(foreign for _, foreign in groups):
-        name = f"--{vain[0]}"
+        name = f"--{vain[0].replace('_', '-')}"
         raise InvalidSettings(f"{name} is for other programs' data, {files[0]} is a run file")
     return [
-        Opened(files=tuple(group), run=read(*group, **(keywords if foreign else {})))
+        Opened(
+            files=tuple(group),
+            run=read(*group, **(keywords if foreign else {})),
+            skips=foreign and options.skip_damaged,
+        )
         for group, foreign in groups
     ]
+
+
+def frame_numbers(run: Run) -> tuple[int, ...]:
+    """Numbers of the frames in their files, which are their places where none is left out."""
+    numbers = getattr(run.frames, "numbers", None)
+    return tuple(range(len(run.frames))) if numbers is None else numbers
+
+
+def frame_place(run: Run, name: str, frame: int) -> int:
+    """Place of the frame of a number, or from the end where it is negative.
+
+    Raises:
+        InvalidSettings: the run has no such frame.
+    """
+    numbers = frame_numbers(run)
+    if frame in numbers:
+        return numbers.index(frame)
+    if -len(numbers) <= frame < 0:
+        return frame + len(numbers)
+    held = f"{numbers[0]}..{numbers[-1]}" if numbers else "none"
+    if len(numbers) > 1 and len(numbers) <= numbers[-1] - numbers[0]:
+        held += f", {len(numbers)} of them"
+    raise InvalidSettings(f"--frame {frame}: {name} holds frames {held}")
 
 
 def open_run(files: Sequence[Path], options: ForeignOptions) -> Opened:
@@ -206,7 +249,8 @@ def _groups(files: Sequence[Path], keywords: dict[str, Any]) -> list[tuple[list[
             groups[-1][0].append(file)
         else:
             groups.append(([file], not own))
-        before = None if file.is_dir() else before if joins else known
+        keeps = joins and not _completes(before, known)
+        before = None if file.is_dir() else before if keeps else known
     return groups
 
 
@@ -217,10 +261,19 @@ def _belongs(file: Path, known: object, before: object) -> bool:
 
     if known is before or not isinstance(before, ForeignFormat) or isinstance(known, Format):
         return known is before
-    if isinstance(known, ForeignFormat) and known.key in before.completed_by:
+    if _completes(known, before) or _completes(before, known):
         return True
     with file.open("rb") as stream:
         return before.matches(file, stream.read(4096))
+
+
+def _completes(part: object, whole: object) -> bool:
+    """Whether files of one format belong to those of another."""
+    from granufab.io.foreign_format import ForeignFormat
+
+    if not isinstance(part, ForeignFormat) or not isinstance(whole, ForeignFormat):
+        return False
+    return part.key in whole.completed_by
 
 
 def print_summaries(opened: Sequence[Opened]) -> None:

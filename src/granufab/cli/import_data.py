@@ -10,7 +10,7 @@ import typer
 
 from granufab.cli.foreign import ForeignOptions, Opened, foreign_options, open_run
 from granufab.cli.output_files import check_new
-from granufab.errors import InvalidSettings
+from granufab.errors import InvalidPacking, InvalidSettings
 
 __all__ = ["import_data"]
 
@@ -36,8 +36,8 @@ def import_data(
     if opened.summary is None:
         raise InvalidSettings(f"{opened.name}: this is a granufab run file already")
     if out is None:
-        for index in range(len(opened.run.frames)):
-            opened.run.frames[index]
+        for frame in opened.run.frames:
+            del frame  # before the next one is read
     else:
         _write(opened, out)
     cost = {"seconds": time.perf_counter() - began, "peak_memory_bytes": _peak_memory()}
@@ -68,13 +68,30 @@ def _write(opened: Opened, out: Path) -> None:
         replacing(out) as unfinished,
         RunFileWriter(unfinished, settings=settings, provenance=source) as writer,
     ):
-        for index in range(len(run.frames)):
-            frame = run.frames[index]
-            writer.frame(frame)
+        for place, frame in enumerate(run.frames):
+            try:
+                writer.frame(frame)
+            except InvalidPacking as error:
+                raise _other_grains(opened, place, error) from None
             row = frame_series(replace(run, frames=[frame]))
             values = {str(name): float(row[name][0]) for name in row.data_vars}
             writer.row({"path": name, **values})  # type: ignore[dict-item]
         writer.close(opened.summary.plain())
+
+
+def _other_grains(opened: Opened, place: int, error: InvalidPacking) -> InvalidSettings:
+    """Which frames a run file can hold, in the words of the command line."""
+    from granufab.io import ForeignFrames
+
+    frames = opened.run.frames
+    assert isinstance(frames, ForeignFrames)
+    first, differs = frames.number(0), frames.number(place)
+    why = str(error).removesuffix("; write another file")
+    return InvalidSettings(
+        f"{opened.name}: {why}; a run file holds the same grains throughout: import "
+        f"--frames {first}:{differs} or a later part, or give these files to measure, fit and "
+        "plot as they are"
+    )
 
 
 def _peak_memory() -> float:

@@ -50,6 +50,7 @@ def _describe_foreign(opened: Opened) -> dict[str, Any]:
         "cell": None if cell is None else cell.matrix.diagonal().tolist(),
         "periodic": None if cell is None else list(cell.periodic),
         "frames": len(opened.run.frames),
+        **opened.skipped(),
         "bytes": sum(file.stat().st_size for file in opened.files if file.is_file()),
         "notes": list(opened.summary.notes),
     }

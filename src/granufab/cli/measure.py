@@ -14,11 +14,13 @@ from granufab.cli.foreign import (
     ForeignOptions,
     Opened,
     foreign_options,
+    frame_numbers,
+    frame_place,
     open_runs,
     print_summaries,
 )
 from granufab.cli.output_files import check_table
-from granufab.errors import InvalidSettings, MissingData
+from granufab.errors import MissingData
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,7 +89,8 @@ def measure(
     if out is not None:
         _write(tables, out)
     if json:
-        print_json([state for table in tables for state in _states(table)])
+        both = zip(opened, tables, strict=True)
+        print_json([state | one.skipped() for one, table in both for state in _states(table)])
         return
     for one, table in zip(opened, tables, strict=True):
         names = [name for name in SHOWN if name in table.variables]
@@ -105,17 +108,17 @@ def _measure_run(
 
     from granufab.fabric import measure_run
 
-    file, run = one.name, one.run
-    numbers = list(range(len(run.frames)))
+    file, run, numbers = one.name, one.run, ()
     if frame is not None:
-        if not -len(numbers) <= frame < len(numbers):
-            raise InvalidSettings(f"--frame {frame}: {file} holds frames 0..{len(numbers) - 1}")
-        numbers = [numbers[frame]]
-        run = replace(run, frames=[run.frames[frame]])
+        place = frame_place(run, file, frame)
+        numbers = frame_numbers(run)[place : place + 1]
+        run = replace(run, frames=[run.frames[place]])
     table = measure_run(run, criterion=criterion, z_definition=z_definition, forces=forces)
+    if frame is None:
+        numbers = frame_numbers(run)
     _explain_unknown(file, run, table)
     table = table.assign(source=("frame", [file] * len(numbers)))
-    return table.assign_coords(frame=numbers)
+    return table.assign_coords(frame=list(numbers))
 
 
 def _states(table: xr.Dataset) -> Iterator[dict[str, Any]]:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from granufab.cli.foreign import frame_place
 from granufab.errors import GranufabError, InvalidSettings, MissingData
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ class Request:
     Attributes:
         figure: its name, for messages.
         runs: by the name of their file.
-        index: of the state, counted from the end where negative.
+        index: number of the state, counted from the end where negative.
         criterion: contact criterion.
         z_definition: which z.
     """
@@ -55,10 +56,13 @@ class Request:
         Raises:
             InvalidSettings: it has no such state.
         """
-        frames = self.runs[name].frames
-        if not -len(frames) <= self.index < len(frames):
-            raise InvalidSettings(f"--frame {self.index}: {name} holds frames 0..{len(frames) - 1}")
-        return frames[self.index]
+        run = self.runs[name]
+        return run.frames[frame_place(run, name, self.index)]
+
+    @property
+    def place(self) -> int:
+        """Place of the wanted state of the one run."""
+        return frame_place(self.run, next(iter(self.runs)), self.index)
 
     @property
     def state(self) -> Frame:
@@ -72,8 +76,7 @@ class Request:
             raise MissingData(
                 f"--figure {self.figure}: the strain of this data is unknown; give --strain"
             )
-        frames = (self.run.frames[k] for k in range(len(self.run.frames)))
-        begin = min(f.eps_q_total for f in frames if f.stage == end.stage)
+        begin = min(f.eps_q_total for f in self.run.frames if f.stage == end.stage)
         return end.stage, (0.5 * (begin + end.eps_q_total), end.eps_q_total)
 
     def contacts(self) -> dict[str, Any]:
@@ -187,7 +190,7 @@ def _homogeneity(request: Request) -> Axes:
     from granufab import fabric, plots
     from granufab.history import frame_before
 
-    before = frame_before(request.run.frames, request.index, HOMOGENEITY_STRAIN)
+    before = frame_before(request.run.frames, request.place, HOMOGENEITY_STRAIN)
     if before is None:
         raise InvalidSettings(
             f"--figure homogeneity needs {HOMOGENEITY_STRAIN} of ε_q in one stage before the "
@@ -252,7 +255,7 @@ def _criterion(request: Request) -> Axes:
     from granufab import fabric, plots
 
     curves = fabric.criterion_curves(
-        request.run, frame=request.index, z_definition=request.z_definition
+        request.run, frame=request.place, z_definition=request.z_definition
     )
     return plots.criterion_curves(curves)[0]
 

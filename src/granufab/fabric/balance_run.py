@@ -165,8 +165,6 @@ def follow_run(
         MissingData: the run has no frames, or a frame lacks what the criterion needs.
         InvalidSettings: an unknown criterion or definition, or a bad ``keep``.
     """
-    if len(run.frames) == 0:
-        raise MissingData(f"run {run.name!r} has no recorded frames")
     rule = ContactRule(
         criterion=run_definitions(run, criterion)[0],
         keep=keep,
@@ -177,8 +175,7 @@ def follow_run(
     place: list[tuple[float, float, int]] = []
 
     def states() -> Iterator[tuple[Packing, IntArray]]:
-        for index in range(len(run.frames)):
-            frame = run.frames[index]
+        for frame in run.frames:
             place.append((frame.eps_q, frame.eps_q_total, frame.stage))
             yield frame.packing, lattice_change(frame)
 

@@ -3,6 +3,10 @@
 A contact joins grain i to one image of grain j. Positions are not wrapped and images are lattice
 shifts, so (i, j, image) lasts as long as the contact does; where a sheared cell was remapped,
 C_now = C T, images are brought back to the lattice vectors before the remap, T·image.
+
+Grains that are not round touch in several points. Which point is which is not known, so those of
+one (i, j, image) are matched such that their normals turn least: as many persist as both states
+have, and the others are gained or lost.
 """
 
 from __future__ import annotations
@@ -26,6 +30,11 @@ __all__ = [
     "identify",
     "persistent",
 ]
+
+_ALONG = 1e-9
+"""1 − cosine between normal and branch up to which grains count as round."""
+_TOUCH = 1e-6
+"""Difference of a gap from the one between spheres, in sums of radii, up to which they do."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +72,7 @@ class IdentifiedContacts:
 
     Attributes:
         key: numbers of grains i ≤ j and the image of j in the first lattice vectors, shape
-            (contact_count, 2 + D); no two alike.
+            (contact_count, 2 + D); alike for the points where two grains touch.
         pair: indices of i and j, shape (contact_count, 2).
         normal: unit vector from i to j [-], shape (contact_count, D).
         number: numbers of all grains, sorted, shape (grain_count,).
@@ -114,7 +123,7 @@ def identify(packing: Packing, contacts: Contacts, change: IntArray) -> Identifi
         contacts: some of its pairs; where they carry no image it follows from the branches.
         change: T of :func:`~granufab.fabric.lattice.lattice_changes`, shape (D, D).
     Raises:
-        InvalidPacking: two grains have one number, or one contact is listed twice.
+        InvalidPacking: two grains have one number, or a contact of round grains is listed twice.
     """
     assert packing.grains.number is not None
     number = packing.grains.number
@@ -126,17 +135,35 @@ def identify(packing: Packing, contacts: Contacts, change: IntArray) -> Identifi
     pair = np.where(turned[:, None], contacts.pair[:, ::-1], contacts.pair)
     sign = np.where(turned, -1, 1)[:, None]
     key = np.column_stack([number[pair], image * sign])
-    unique, first = np.unique(key, axis=0, return_index=True)
-    if len(unique) < len(key):
-        twice = key[np.setdiff1d(np.arange(len(key)), first)[0]]
-        raise InvalidPacking(
-            f"the contact of grains {twice[0]} and {twice[1]} (image {twice[2:].tolist()}) is "
-            "listed twice; list each pair once"
-        )
+    _check_once(packing, contacts, key)
     lattice = None if packing.cell is None else packing.cell.matrix @ np.linalg.inv(change)
     return IdentifiedContacts(
         key=key, pair=pair, normal=contacts.normal * sign, number=ordered, lattice=lattice
     )
+
+
+def _check_once(packing: Packing, contacts: Contacts, key: IntArray) -> None:
+    """Refuse a second contact of two grains that touch as round ones do."""
+    unique, group, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
+    if len(unique) == len(key):
+        return
+    rows = np.flatnonzero(count[group.reshape(-1)] > 1)
+    keep = np.zeros(len(key), bool)
+    keep[rows] = True
+    several = contacts.select(keep)
+    branch = branch_vectors(Packing(grains=packing.grains, contacts=several, cell=packing.cell))
+    length = np.linalg.norm(branch, axis=1)
+    reach = packing.grains.radius[several.pair].sum(axis=1)
+    round_ = np.einsum("ci,ci->c", several.normal, branch) > (1 - _ALONG) * length
+    round_ |= contacts.branch is None and contacts.gap is None  # nothing tells another shape
+    if several.gap is not None:
+        round_ &= np.abs(length - reach - several.gap) < _TOUCH * reach
+    if round_.any():
+        twice = key[rows[np.argmax(round_)]]
+        raise InvalidPacking(
+            f"the contact of grains {twice[0]} and {twice[1]} (image {twice[2:].tolist()}) is "
+            "listed twice; list each pair once"
+        )
 
 
 def _images(packing: Packing, contacts: Contacts) -> IntArray:
@@ -175,8 +202,36 @@ def persistent(before: IdentifiedContacts, after: IdentifiedContacts) -> tuple[I
     keys = np.concatenate([before.key, after.key])
     label = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
     first, second = label[: before.count], label[before.count :]
-    _, rows, others = np.intersect1d(first, second, assume_unique=True, return_indices=True)
-    return rows.astype(np.int64), others.astype(np.int64)
+    counts = [np.bincount(part, minlength=len(keys)) for part in (first, second)]
+    single = (counts[0] <= 1) & (counts[1] <= 1)
+    lone, others = np.flatnonzero(single[first]), np.flatnonzero(single[second])
+    _, rows, twins = np.intersect1d(
+        first[lone], second[others], assume_unique=True, return_indices=True
+    )
+    found = [np.stack([lone[rows], others[twins]], axis=1)]
+    shared = np.flatnonzero(~single & (counts[0] > 0) & (counts[1] > 0))
+    if len(shared):
+        found += _nearest_normals(before.normal, after.normal, first, second, shared)
+    pairs = np.concatenate(found).astype(np.int64)
+    return pairs[:, 0], pairs[:, 1]
+
+
+def _nearest_normals(
+    before: Array, after: Array, first: IntArray, second: IntArray, shared: IntArray
+) -> Iterator[IntArray]:
+    """Rows, before and after, of the points that two grains share, for each of these labels."""
+    from scipy.optimize import linear_sum_assignment  # slow to import: only for such grains
+
+    orders = [np.argsort(part, kind="stable") for part in (first, second)]
+    begin, end = (
+        [np.searchsorted(part, shared, side=side, sorter=order)
+         for part, order in zip((first, second), orders, strict=True)]
+        for side in ("left", "right")
+    )  # fmt: skip
+    for k in range(len(shared)):
+        one, two = (order[begin[s][k] : end[s][k]] for s, order in enumerate(orders))
+        chosen = linear_sum_assignment(before[one] @ after[two].T, maximize=True)
+        yield np.stack([one[chosen[0]], two[chosen[1]]], axis=1)
 
 
 def follow_contacts(

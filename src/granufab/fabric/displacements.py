@@ -227,8 +227,8 @@ def _each(states: States) -> Iterator[State]:
         yield from states
     else:
         frames = states.frames if isinstance(states, Run) else states
-        if not hasattr(frames, "__getitem__"):
-            yield from frames  # pyright: ignore[reportGeneralTypeIssues]
+        if hasattr(frames, "__iter__"):
+            yield from frames
             return
         for index in range(len(frames)):  # pyright: ignore[reportArgumentType]
             yield frames[index]  # pyright: ignore[reportIndexIssue]

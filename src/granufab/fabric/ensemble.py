@@ -127,7 +127,7 @@ def late_frames(run: Run, *, share: float = 1 / 3, stage: int = -1) -> list[Fram
     """
     if not 0.0 < share <= 1.0:
         raise InvalidSettings(f"share is {share!r}, must lie in 0..1")
-    frames = [run.frames[index] for index in range(len(run.frames))]
+    frames = list(run.frames)
     stages = sorted({frame.stage for frame in frames})
     wanted = stages[stage] if stage < 0 and -stage <= len(stages) else stage
     chosen = [frame for frame in frames if frame.stage == wanted]

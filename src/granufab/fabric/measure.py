@@ -164,12 +164,9 @@ def measure_run(
         MissingData: the run has no frames, or a frame holds nothing to measure.
         InvalidSettings: an unknown criterion or definition.
     """
-    if len(run.frames) == 0:
-        raise MissingData(f"run {run.name!r} has no recorded frames")
     rule, definition, fewest = run_definitions(run, criterion, z_definition, minimum)
     rows = []
-    for index in range(len(run.frames)):
-        frame = run.frames[index]
+    for frame in run.frames:
         row = measure(
             frame.packing,
             criterion=rule,

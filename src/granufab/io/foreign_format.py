@@ -23,7 +23,8 @@ class ForeignFormat:
             completes, from its path and first bytes (none for a folder).
         open: open files that belong together, in the order given; parses no frame yet beyond
             what finding them takes. Raises MissingData where a part is missing, and says which.
-        completed_by: keys of formats whose files, given after one of this, belong to it.
+        completed_by: keys of formats whose files, given before or after one of this, belong to
+            it.
     """
 
     key: str

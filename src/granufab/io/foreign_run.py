@@ -7,7 +7,7 @@ axis, against the extension axis, as in the program's own runs.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import overload
 
 import numpy as np
 
-from granufab.errors import CorruptFile, MissingData
+from granufab.errors import CorruptFile, InvalidSettings, MissingData
 from granufab.fabric.stress import stress_tensor
 from granufab.history import Frame, Run, series_dataset
 from granufab.io.assemble import assemble
@@ -41,6 +41,8 @@ def foreign_run(name: str, files: Sequence[Path], source: Source, options: ReadO
         options: what the user adds.
     Raises:
         MissingData: the source holds no frame with grains.
+        CorruptFile: the first frame is damaged, or with ``skip_damaged`` all are.
+        InvalidSettings: none of the frames is chosen.
     """
     summary = ImportSummary(
         format=name,
@@ -83,34 +85,80 @@ class _Path:
 class ForeignFrames(Sequence[Frame]):
     """The frames of a source that hold grains; each is parsed when it is asked for.
 
+    Frames have the numbers of the data, from 0 for the first that holds grains. A chosen part of
+    them (``frames``) and what is left after damaged ones (``skip_damaged``) are counted on from 0
+    again, and :attr:`numbers` tells which they are. Whether a frame is damaged shows when it is
+    read, so with ``skip_damaged`` a loop over the frames reads each of them once, while their
+    count and negative indices read on to the end first.
+
     Args:
         source: the opened files.
         options: what the user adds.
         summary: filled while frames are read.
+    Raises:
+        MissingData: no frame has grains.
+        InvalidSettings: none of the frames is chosen.
+        CorruptFile: the first frame is damaged.
     """
 
     def __init__(self, source: Source, options: ReadOptions, summary: ImportSummary) -> None:
         self._source, self._options, self.summary = source, options, summary
         self._begun: FoundFrame | None = None
-        self._start: FoundCell | None = None
+        self._start: tuple[int, FoundCell | None] | None = None
         self._counted: set[int] = set()
         self._order: IntArray | None = None
         self._latest: tuple[int, Frame] | None = None
-        self._skip = self._leading_empty()
+        self._empty = self._leading_empty()
+        self._wanted = self._chosen(len(source) - self._empty)
+        self._untried = iter(self._wanted if options.skip_damaged else ())
+        self._good = [] if options.skip_damaged else list(self._wanted)
         self._path: _Path | None = None
 
     def _leading_empty(self) -> int:
         """Empty frames at the beginning: dumps often start before the first insertion."""
         for index in range(len(self._source)):
-            found = self._source[index]
+            try:
+                found = self._source[index]
+            except CorruptFile as error:
+                if self._options.skip_damaged:
+                    return index
+                raise self._naming_the_option(error) from None
             if len(found.position):
                 self.summary.empty_frames += index
-                self._begun, self._start = found, found.cell
+                self._begun = found
                 return index
         raise MissingData(f"{self.summary.files[0]}: no frame of this data has grains")
 
+    def _chosen(self, count: int) -> range:
+        wanted = range(count)[self._options.frame_slice()]
+        if not wanted:
+            raise InvalidSettings(
+                f"frames {self._options.frames!r}: {self.summary.files[0]} holds frames "
+                f"0..{count - 1}"
+            )
+        if wanted.start:
+            self._begun = None
+        return wanted
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The numbers that the frames have in the data; reads on to the end where it must."""
+        self._seek(None)
+        return tuple(self._good)
+
+    def number(self, place: int) -> int:
+        """The number in the data of the frame at a place ≥ 0, which has been read."""
+        return self._good[place]
+
     def __len__(self) -> int:
-        return len(self._source) - self._skip
+        self._seek(None)
+        return len(self._good)
+
+    def __iter__(self) -> Iterator[Frame]:
+        place = 0
+        while self._seek(place):
+            yield self[place]
+            place += 1
 
     @overload
     def __getitem__(self, index: int, /) -> Frame: ...
@@ -120,32 +168,74 @@ class ForeignFrames(Sequence[Frame]):
         if isinstance(index, slice):
             return [self[k] for k in range(*index.indices(len(self)))]
         place = index + len(self) if index < 0 else index
-        if not 0 <= place < len(self):
+        if place < 0 or not self._seek(place):
             raise IndexError(f"frame {index}, allowed: 0..{len(self) - 1}")
-        if self._latest is None or self._latest[0] != place:
+        return self._read(self._good[place])
+
+    def _seek(self, place: int | None) -> bool:
+        """Whether there is a frame at that place, after trying frames up to it (None: all)."""
+        while place is None or place >= len(self._good):
+            number = next(self._untried, None)
+            if number is None:
+                break
+            try:
+                self._read(number)
+            except (CorruptFile, MissingData) as error:
+                if isinstance(error, MissingData) and not self._good:
+                    raise  # what the first frame lacks is no damage
+                self.summary.skipped_frames.append({"frame": number, "reason": str(error)})
+            else:
+                self._good.append(number)
+        if not self._good and self.summary.skipped_frames:
+            raise CorruptFile(
+                f"{self.summary.files[0]}: all {len(self._wanted)} frames are damaged; the first: "
+                f"{self.summary.skipped_frames[0]['reason']}"
+            )
+        return place is not None and place < len(self._good)
+
+    def _read(self, number: int) -> Frame:
+        """The frame of a number; the latest one is kept."""
+        if self._latest is None or self._latest[0] != number:
             self._latest = None  # before the next is read: one frame in memory, not two
-            found = self._found(place)
-            self._latest = (place, self._frame(self._packing(found, place), found.cell, place))
+            try:
+                found = self._found(number)
+                packing = self._packing(found, number)
+            except (CorruptFile, MissingData) as error:
+                raise self._naming_the_option(error) from None
+            if self._start is None:
+                self._start = number, found.cell
+            self._latest = (number, self._frame(packing, found.cell, number))
         return self._latest[1]
 
-    def _packing(self, found: FoundFrame, place: int) -> Packing:
+    def _naming_the_option(self, error: CorruptFile | MissingData) -> CorruptFile | MissingData:
+        """The error of one frame, with what reads the others."""
+        all_alike = isinstance(error, MissingData) and self._start is None
+        if self._options.skip_damaged or len(self._source) < 2 or all_alike:
+            return error
+        return type(error)(f"{error}; skip_damaged (--skip-damaged) reads the other frames")
+
+    def _packing(self, found: FoundFrame, number: int) -> Packing:
         """The state, its grains in the order of the first frame read; counted once."""
-        again = place in self._counted
-        summary = ImportSummary(format=self.summary.format) if again else self.summary
-        packing = assemble(found, self._options, summary)
-        self._counted.add(place)
+        again = number in self._counted
+        counts = ImportSummary(format=self.summary.format)
+        packing = assemble(found, self._options, counts)
+        if not again:  # not before: a damaged frame counts nothing
+            self.summary.add(counts)
+        self._counted.add(number)
         if self._order is None:
             self._order = packing.grains.number
         return packing if self._order is None else in_order(packing, self._order)
 
-    def _found(self, place: int) -> FoundFrame:
+    def _found(self, number: int) -> FoundFrame:
         """A frame as the source gives it; what the beginning parsed already is used once."""
         begun, self._begun = self._begun, None
-        return begun if begun is not None and place == 0 else self._source[place + self._skip]
+        return begun if begun is not None and number == 0 else self._source[number + self._empty]
 
-    def _frame(self, packing: Packing, cell: FoundCell | None, place: int) -> Frame:
+    def _frame(self, packing: Packing, cell: FoundCell | None, number: int) -> Frame:
+        assert self._start is not None
         path = self._strained(packing)
-        strain, eps_q = _strain(path, packing, cell, place, self._options.strain)
+        since = number - self._start[0]
+        strain, eps_q = _strain(path, packing, cell, since, self._options.strain)
         return Frame(
             packing=packing,
             eps_q=eps_q,
@@ -160,15 +250,19 @@ class ForeignFrames(Sequence[Frame]):
 
     def _last_cell(self) -> FoundCell | None:
         """Of the last frame that is no corrupt one: it tells whether the cell deforms."""
-        for index in range(len(self._source) - 1, self._skip, -1):
+        assert self._start is not None
+        for number in reversed(self._wanted):
+            if number <= self._start[0]:
+                break
             with suppress(CorruptFile):
-                return self._source[index].cell
-        return self._start
+                return self._source[number + self._empty].cell
+        return self._start[1]
 
     def _strained(self, packing: Packing) -> _Path:
         """The path, found once from the first and the last cell."""
         if self._path is None:
-            self._path = _path_of(self._start, self._last_cell, packing, self._options)
+            start = None if self._start is None else self._start[1]
+            self._path = _path_of(start, self._last_cell, packing, self._options)
             self.summary.conventions["strain"] = self._path.known
         return self._path
 
@@ -239,7 +333,7 @@ def _across(direction: Array) -> Array:
 
 
 def _strain(
-    path: _Path, packing: Packing, cell: FoundCell | None, place: int, per_frame: float | None
+    path: _Path, packing: Packing, cell: FoundCell | None, since: int, per_frame: float | None
 ) -> tuple[Array, float]:
     dimension = packing.dimension
     lattice = _lattice(cell, dimension)
@@ -249,7 +343,7 @@ def _strain(
         two = path.direction @ strain @ path.direction - path.extension @ strain @ path.extension
         return strain, float(two)
     unknown = np.full((dimension, dimension), np.nan)
-    return unknown, float("nan") if per_frame is None else place * per_frame
+    return unknown, float("nan") if per_frame is None else since * per_frame
 
 
 def _stress(packing: Packing) -> Array:

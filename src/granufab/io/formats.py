@@ -6,7 +6,8 @@ To read a foreign format, write one module in ``granufab.io.readers`` with a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -99,7 +100,19 @@ def read(path: Path | str, *more: Path | str, format: str | None = None, **optio
     for one in paths:
         if not one.exists():
             raise MissingData(f"{one}: no such file")
+    if format is None:
+        known = _completed(known, paths[1:])
     return foreign_run(known.name, paths, known.open(paths, given), given)
+
+
+def _completed(known: ForeignFormat, more: Sequence[Path]) -> ForeignFormat:
+    """The format whose data the first file completes, where such a file is given after it."""
+    for path in more:
+        with suppress(UnknownFormat):
+            other = detect(path)
+            if isinstance(other, ForeignFormat) and known.key in other.completed_by:
+                return other
+    return known
 
 
 def format_of(

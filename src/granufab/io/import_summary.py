@@ -8,6 +8,14 @@ from typing import Any
 
 __all__ = ["ImportSummary"]
 
+_SUMS = (
+    "frames_read", "walls_dropped", "wall_contacts_dropped", "duplicates_dropped",
+    "self_contacts_dropped",
+)  # fmt: skip
+_LATEST = ("grains", "contacts", "rattlers")
+_SHOWN = 5
+"""Skipped frames whose reasons are shown to a person; a program gets all of them."""
+
 
 @dataclass(slots=True, kw_only=True)
 class ImportSummary:
@@ -22,6 +30,7 @@ class ImportSummary:
             frames read.
         rattlers: grains with fewer than two contacts in the frame read last, or None.
         round_grains: False where grains are neither disks nor spheres.
+        skipped_frames: number and reason of frames that could not be read and were left out.
         conventions: what the normals, forces and dimensions turned out to be, by topic.
         unknown_columns: of the files, not understood.
         notes: of the reader.
@@ -40,9 +49,18 @@ class ImportSummary:
     self_contacts_dropped: int = 0
     rattlers: int | None = None
     round_grains: bool = True
+    skipped_frames: list[dict[str, Any]] = field(default_factory=list)
     conventions: dict[str, str] = field(default_factory=dict)
     unknown_columns: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+
+    def add(self, frame: ImportSummary) -> None:
+        """Take over the counts and conventions of one more frame."""
+        for name in _SUMS:
+            setattr(self, name, getattr(self, name) + getattr(frame, name))
+        for name in _LATEST:
+            setattr(self, name, getattr(frame, name))
+        self.conventions.update(frame.conventions)
 
     def plain(self) -> Mapping[str, Any]:
         """Plain data, for JSON."""
@@ -67,6 +85,12 @@ class ImportSummary:
             text.append(f"left out: {left_out}")
         if self.empty_frames:
             text.append(f"empty frames: {self.empty_frames}")
+        if self.skipped_frames:
+            text.append(f"warning: {len(self.skipped_frames)} damaged frames skipped")
+            text += [f"frame {one['frame']} skipped: {one['reason']}"
+                     for one in self.skipped_frames[:_SHOWN]]  # fmt: skip
+            rest = [str(one["frame"]) for one in self.skipped_frames[_SHOWN:]]
+            text += [f"also skipped: {', '.join(rest)}"] if rest else []
         text += [f"{topic}: {what}" for topic, what in self.conventions.items()]
         if self.unknown_columns:
             text.append(f"columns not understood: {', '.join(self.unknown_columns)}")

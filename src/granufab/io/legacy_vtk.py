@@ -1,7 +1,7 @@
 """Legacy VTK files of points with values: ASCII and binary, versions 1 to 5.
 
-Read are the points of POLYDATA and UNSTRUCTURED_GRID and the arrays of POINT_DATA and FIELD; cells
-and their data are passed over.
+Read are the points and lines of POLYDATA and UNSTRUCTURED_GRID and the arrays of POINT_DATA,
+CELL_DATA and FIELD; cells of other kinds are passed over.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from granufab.errors import CorruptFile
-from granufab.packing import Array
+from granufab.packing import Array, IntArray
 
 __all__ = ["VtkPoints", "is_legacy_vtk", "read_legacy_vtk"]
 
@@ -33,12 +33,16 @@ class VtkPoints:
 
     Attributes:
         position: shape (point_count, 3).
+        lines: points at the ends of each cell, if all cells have two, shape (cell_count, 2).
         data: of the points by name, shape (point_count, components).
+        cells: of the cells by name, shape (cell_count, components).
         field: of the whole data set by name.
     """
 
     position: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    lines: IntArray = field(default_factory=lambda: np.zeros((0, 2), np.int64))
     data: dict[str, Array] = field(default_factory=dict)
+    cells: dict[str, Array] = field(default_factory=dict)
     field: dict[str, Array] = field(default_factory=dict)
 
 
@@ -66,6 +70,8 @@ def read_legacy_vtk(path: Path) -> VtkPoints:
     found, owner = VtkPoints(), "field"
     while text.more():
         owner = _section(text, found, owner)
+    if not text.pointed:
+        raise text.wrong("the file ends without POINTS")
     return found
 
 
@@ -75,9 +81,12 @@ def _section(text: _Text, found: VtkPoints, owner: str) -> str:
     word = words[0]
     if word == "POINTS":
         count = text.whole(words, 1)
+        text.pointed = True
         found.position = text.values(3 * count, words[2] if len(words) > 2 else "").reshape(-1, 3)
     elif word in _CELLS:
-        _skip_cells(text, text.whole(words, 1), text.whole(words, 2))
+        lines = _read_cells(text, text.whole(words, 1), text.whole(words, 2))
+        if word in ("LINES", "CELLS"):
+            found.lines = lines
     elif word == "CELL_TYPES":
         text.values(text.whole(words, 1), "int")
     elif word in ("POINT_DATA", "CELL_DATA"):
@@ -94,12 +103,17 @@ def _section(text: _Text, found: VtkPoints, owner: str) -> str:
     return owner
 
 
-def _skip_cells(text: _Text, count: int, size: int) -> None:
+def _read_cells(text: _Text, count: int, size: int) -> IntArray:
+    """The points of the cells, shape (cell_count, 2); none where a cell has other than two."""
+    none = np.zeros((0, 2), np.int64)
     if text.peek().startswith("OFFSETS"):
-        for length in (count, size):
-            text.values(length, text.line().split()[-1])
-    else:
-        text.values(size, "int")
+        offsets, joined = (text.values(n, text.line().split()[-1]) for n in (count, size))
+        pairs = len(joined) == 2 * (count - 1) and (np.diff(offsets) == 2).all()
+        return joined.astype(np.int64).reshape(-1, 2) if pairs else none
+    table = text.values(size, "int")
+    if size != 3 * count or (table[::3] != 2).any():
+        return none
+    return table.reshape(-1, 3)[:, 1:].astype(np.int64)
 
 
 def _read_field(text: _Text, found: VtkPoints, owner: str, arrays: int) -> None:
@@ -112,6 +126,10 @@ def _read_field(text: _Text, found: VtkPoints, owner: str, arrays: int) -> None:
             if rows != len(found.position) or width == 0:
                 raise text.wrong(f"{words[0]} has {rows} rows, there are {len(found.position)}")
             found.data[words[0]] = values.reshape(rows, width)
+        elif owner == "CELL_DATA":
+            if rows != text.items or width == 0:
+                raise text.wrong(f"{words[0]} has {rows} rows, there are {text.items} cells")
+            found.cells[words[0]] = values.reshape(rows, width)
         elif owner == "field":
             found.field[words[0]] = values
 
@@ -127,8 +145,9 @@ def _attribute(text: _Text, found: VtkPoints, owner: str, words: list[str]) -> N
     if words[0] == "SCALARS" and text.peek().startswith("LOOKUP_TABLE"):
         text.line()
     values = text.values(width * text.items, words[2])
-    if owner == "POINT_DATA" and width:
-        found.data[words[1]] = values.reshape(-1, width)
+    if width:
+        arrays = found.data if owner == "POINT_DATA" else found.cells
+        arrays[words[1]] = values.reshape(-1, width)
 
 
 class _Text:
@@ -136,7 +155,7 @@ class _Text:
 
     def __init__(self, path: Path) -> None:
         self.path, self.bytes, self.at = path, path.read_bytes(), 0
-        self.binary, self.items = False, 0
+        self.binary, self.items, self.pointed = False, 0, False
 
     def wrong(self, what: str) -> CorruptFile:
         return CorruptFile(f"{self.path}: byte {self.at}: {what}")

@@ -29,6 +29,11 @@ class ReadOptions:
         friction: coefficient between grains, where the file does not tell it.
         strain: deviatoric strain ε_q from one frame to the next, where no cell deforms.
         axis: contraction axis of a' and ε_q, "x", "y", "z" or components "0,1,0".
+        frames: those that are read, "A:B" or "A:B:STEP" as Python counts: from 0, without B,
+            from the end where negative; default all.
+        skip_damaged: True leaves out frames that cannot be read, and the summary lists them with
+            the reasons. The default stops at the first one: a series with a gap has other
+            strains, rates and averages, which should not happen unseen.
     """
 
     dimension: int | None = None
@@ -40,6 +45,8 @@ class ReadOptions:
     friction: float | None = None
     strain: float | None = None
     axis: str | None = None
+    frames: str | None = None
+    skip_damaged: bool = False
 
     def __post_init__(self) -> None:
         if self.dimension not in (None, 2, 3):
@@ -56,6 +63,27 @@ class ReadOptions:
         if self.friction is not None and not self.friction >= 0:
             raise InvalidSettings(f"friction is {self.friction!r}, must be ≥ 0")
         self.direction(2)
+        self.frame_slice()
+
+    def frame_slice(self) -> slice:
+        """The part of the series that ``frames`` chooses.
+
+        Raises:
+            InvalidSettings: it is no part, or runs backwards.
+        """
+        if self.frames is None:
+            return slice(None)
+        words = self.frames.split(":")
+        try:
+            ends = [int(word) if word.strip() else None for word in words]
+        except ValueError:
+            ends = []
+        step = ends[2] if len(ends) == 3 else None
+        if len(ends) not in (2, 3) or (step is not None and step < 1):
+            raise InvalidSettings(
+                f"frames is {self.frames!r}, allowed: A:B or A:B:STEP, such as 10:20 or ::5"
+            )
+        return slice(*ends)
 
     def direction(self, dimension: int) -> np.ndarray | None:
         """Unit vector of ``axis``, or None.

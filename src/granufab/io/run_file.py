@@ -235,10 +235,12 @@ class RunFileWriter:
 
     def _check_same_grains(self, first: Packing, packing: Packing) -> None:
         where = f"frame {self._frames}"
-        if packing.grains.position.shape != first.grains.position.shape:
+        shapes = packing.grains.position.shape, first.grains.position.shape
+        if shapes[0] != shapes[1]:
+            (count, now), (begun, before) = shapes
             raise InvalidPacking(
-                f"{where} has positions of shape {packing.grains.position.shape}, but the run "
-                f"began with {first.grains.position.shape}; write another file"
+                f"{where} has {count} grains in {now}D, but the run began with {begun} in "
+                f"{before}D; write another file"
             )
         for name in ("radius", "mass", "number"):
             old, new = getattr(first.grains, name), getattr(packing.grains, name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, overload
 
@@ -94,6 +94,10 @@ class RunFileFrames(Sequence[Frame]):
 
     def __len__(self) -> int:
         return self._count
+
+    def __iter__(self) -> Iterator[Frame]:
+        for index in range(self._count):
+            yield self[index]
 
     @overload
     def __getitem__(self, index: int, /) -> Frame: ...

@@ -17,6 +17,7 @@ from granufab.io.lammps.contacts import contact_columns, parse_contacts, unnamed
 from granufab.io.lammps.dump_index import DumpFrame, index_dump
 from granufab.io.lammps.grains import grain_columns, parse_grains
 from granufab.io.lammps.recognise import recognised, told
+from granufab.io.lammps.walls import apart, with_walls
 from granufab.io.read_options import ReadOptions
 from granufab.packing import Array
 
@@ -46,7 +47,11 @@ def open_dumps(paths: Sequence[Path], options: ReadOptions) -> Source:
         raise MissingData(
             f"{paths[0]}: contacts without their grains; give the atom dump of the same steps too"
         )
+    contacts, walls = apart(contacts, options) if contacts else ([], [])
     frames = _matched(grains, contacts, notes)
+    beside = [dict(_numbered(_joined([file], notes))) for file in walls]
+    if walls and not contacts:
+        notes.append(f"{walls[0][0].path}: contacts with walls, left out")
     unknown = list(grain_columns(frames[-1].grains, options).unknown)
     known: dict[tuple[str, ...], Columns] = {}
     if contacts:
@@ -56,6 +61,7 @@ def open_dumps(paths: Sequence[Path], options: ReadOptions) -> Source:
     else:
         notes.append(_BY_GAP)
 
+    keys = [key for key, _ in _numbered([pair.grains for pair in frames])]
     turned = _turned([pair.grains for pair in frames])
 
     def parse(index: int) -> FoundFrame:
@@ -63,6 +69,8 @@ def open_dumps(paths: Sequence[Path], options: ReadOptions) -> Source:
         if listed is not None:
             columns = known.get(listed.columns) or contact_columns(listed, options)
             contacts = parse_contacts(listed, columns)
+            key = keys[index]
+            contacts = with_walls(contacts, [file[key] for file in beside if key in file])
         found = parse_grains(frames[index].grains, options, contacts)
         if found.cell is None or index not in turned:
             return found

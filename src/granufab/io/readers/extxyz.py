@@ -10,6 +10,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -37,13 +38,14 @@ _IGNORED = ("species", "type", "Z")
 
 @dataclass(frozen=True, slots=True)
 class _Block:
-    """Where the rows of one frame lie."""
+    """Where the rows of one frame lie, or why they cannot be found."""
 
     start: int
     end: int
     rows: int
     line: int
     comment: str
+    broken: str = ""
 
 
 def _matches(path: Path, head: bytes) -> bool:
@@ -57,18 +59,31 @@ def _matches(path: Path, head: bytes) -> bool:
 def _blocks(path: Path) -> tuple[list[_Block], str]:
     """Complete frames, and what is wrong after them."""
     blocks: list[_Block] = []
-    size, line = path.stat().st_size, 0
+    size, line, last = path.stat().st_size, 0, b""
     with path.open("rb") as stream:
         while first := stream.readline():
             line += 1
             if not first.strip():
                 continue
-            if not first.strip().isdigit() or not first.endswith(b"\n"):
-                return blocks, f"line {line} is no count of rows: {first[:40]!r}"
-            rows, comment = int(first[:40]), stream.readline()
+            wrong, rows = "", int(first[:40]) if first[:40].strip().isdigit() else -1
+            if rows < 0 or not first.endswith(b"\n"):
+                wrong = f"line {line} is no count of rows: {first[:40]!r}"
+            elif rows > (size - stream.tell()) // 2 + 1:
+                wrong = f"line {line} declares {rows} rows, the file is too short"
+            if wrong:
+                next_one = _next_frame(stream, line)
+                if next_one is None:
+                    return blocks, wrong
+                if not _is_row(first, last):
+                    blocks.append(_Block(0, 0, 0, line, "", wrong))
+                elif blocks:  # of a frame whose count is too small
+                    blocks[-1] = _Block(0, 0, 0, line, "", wrong)
+                start, line = next_one
+                stream.seek(start)
+                last = b""
+                continue
+            comment = stream.readline()
             start = stream.tell()
-            if rows > (size - start) // 2 + 1:
-                return blocks, f"line {line} declares {rows} rows, the file is too short"
             last = comment
             for _ in range(rows):
                 last = stream.readline()
@@ -78,6 +93,25 @@ def _blocks(path: Path) -> tuple[list[_Block], str]:
             blocks.append(_Block(start, stream.tell(), rows, line + 2, text))
             line += rows + 1
     return blocks, ""
+
+
+def _is_row(line: bytes, row: bytes) -> bool:
+    """Whether a line where a frame should begin looks like the row before it."""
+    words = len(line.split())
+    return words > 1 and words == len(row.split()) and b"=" not in line
+
+
+def _next_frame(stream: BinaryIO, line: int) -> tuple[int, int] | None:
+    """Where the next frame begins after a line that is none, and the number of the line before."""
+    place, before = stream.tell(), b""
+    count_place = place
+    for text in stream:
+        line += 1
+        if before.strip().isdigit() and (b"Properties=" in text or b"Lattice=" in text):
+            return count_place, line - 2
+        count_place, before = place, text
+        place += len(text)
+    return None
 
 
 def _columns(text: str, place: str) -> dict[str, list[int]]:
@@ -94,6 +128,8 @@ def _columns(text: str, place: str) -> dict[str, list[int]]:
 
 
 def _frame(path: Path, block: _Block) -> FoundFrame:
+    if block.broken:
+        raise CorruptFile(f"{path}: {block.broken}")
     place = f"{path}: frame at line {block.line - 2}"
     header = {k: v.strip("\"'[]{}") for k, v in _PAIR.findall(block.comment)}
     columns = _columns(header.get("Properties", "species:S:1:pos:R:3"), place)
@@ -179,7 +215,7 @@ def _open(paths: Sequence[Path], options: ReadOptions) -> Source:
             notes.append(f"{path}: read up to the last complete frame ({wrong})")
         frames += [(path, block) for block in blocks]
         if blocks:
-            header = dict(_PAIR.findall(blocks[0].comment))
+            header = dict(_PAIR.findall(next((b.comment for b in blocks if b.comment), "")))
             names = _columns(header.get("Properties", "").strip("\"'") or "pos:R:3", str(path))
             known = {*_IGNORED, *(name for group in _NAMES.values() for name in group)}
             unknown |= dict.fromkeys(name for name in names if name not in known)

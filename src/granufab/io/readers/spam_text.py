@@ -68,6 +68,7 @@ def _box(spheres: Path) -> FoundCell | None:
 def _contacts(path: Path) -> FoundContacts:
     table = number_table(path, range(6), columns=10)
     return FoundContacts(
+        place=str(path),
         first=table[:, 0].astype(np.int64),
         second=table[:, 1].astype(np.int64),
         normal=table[:, 2:5],

@@ -3,7 +3,8 @@
 Grains are a file whose points have an array radius, radii, r or diameter. Contacts are a second
 file: cells or points with two numbers (id1, id2), else lines whose ends lie at centres of grains.
 Several files of grains are the frames of a series, each with its file of contacts, both in the
-order given. Conventions of the listed forces are ours: on the second grain, compression positive.
+order given. Conventions of the listed forces are ours: on the second grain, compression positive;
+lines with id1 and id2 but without normals are those of LIGGGHTS (:mod:`granufab.io.line_contacts`).
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from scipy.spatial import cKDTree
 from granufab.errors import CorruptFile, MissingData
 from granufab.io.foreign_format import ForeignFormat
 from granufab.io.found import FoundCell, FoundContacts, FoundFrame, LazyFrames, Source
+from granufab.io.line_contacts import line_contacts
 from granufab.io.read_options import ReadOptions
 from granufab.io.vtk_arrays import VtkFile, is_vtk_xml
 from granufab.packing import Array, IntArray
@@ -154,6 +156,14 @@ def _contacts(
     file = VtkFile(path)
     columns = _cells(file)
     pair = _pair(columns)
+    if {"id1", "id2"} <= set(columns) and "normal" not in columns:
+        points, lines = _lines(file)
+        if len(lines) == len(columns["id1"]):
+            cells = {name: values.astype(float).reshape(len(values), -1)
+                     for name, values in columns.items()}  # fmt: skip
+            return line_contacts(
+                str(path), points, lines, cells, position=position, radius=radius, number=number
+            )
     if pair is None:
         points = _pieces(file, "PointData", ("NumberOfPoints",))
         pair = _pair(points)
@@ -188,12 +198,7 @@ def _pair(columns: Columns) -> IntArray | None:
 
 def _ends(file: VtkFile, position: Array, radius: NDArray | None) -> IntArray:
     """The grains at the two ends of each line."""
-    ends, start = [], 0
-    points = _points(file)
-    for piece in file.pieces():
-        ends.append(_line_ends(file, piece) + start)
-        start += file.count(piece, "NumberOfPoints")
-    line = np.concatenate(ends) if ends else np.zeros((0, 2), np.int64)
+    points, line = _lines(file)
     if len(line) == 0:
         raise MissingData(
             f"{file.path}: has neither points with a radius, nor contacts with id1 and id2, nor "
@@ -212,6 +217,15 @@ def _ends(file: VtkFile, position: Array, radius: NDArray | None) -> IntArray:
             "grain; contacts need id1 and id2, or lines between centres"
         )
     return np.asarray(grain, np.int64).reshape(-1, 2)
+
+
+def _lines(file: VtkFile) -> tuple[Array, IntArray]:
+    """The points, and those at the ends of each line."""
+    ends, start = [], 0
+    for piece in file.pieces():
+        ends.append(_line_ends(file, piece) + start)
+        start += file.count(piece, "NumberOfPoints")
+    return _points(file), np.concatenate(ends) if ends else np.zeros((0, 2), np.int64)
 
 
 def _line_ends(file: VtkFile, piece: Element) -> IntArray:
