@@ -12,7 +12,7 @@ _SUMS = (
     "frames_read", "walls_dropped", "wall_contacts_dropped", "duplicates_dropped",
     "self_contacts_dropped",
 )  # fmt: skip
-_LATEST = ("grains", "contacts", "rattlers")
+_LATEST = ("grains", "contacts", "rattlers", "round_grains")
 _SHOWN = 5
 """Skipped frames whose reasons are shown to a person; a program gets all of them."""
 

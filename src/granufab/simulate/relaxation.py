@@ -72,8 +72,8 @@ class Relaxed:
             for name, label in (("z_backbone", "z_backbone"), ("a", "a"), ("phi", "φ"))
         )
         return (
-            f"overlaps up to {self.overlap[0]:.1e} d relaxed to {self.overlap[1]:.1e} d in "
-            f"{self.steps} steps at fixed shape of the cell: {changes}"
+            f"overlaps relaxed in {self.steps} steps at fixed shape of the cell: up to "
+            f"{self.overlap[0]:.1e} d before, {self.overlap[1]:.1e} d now; {changes}"
         )
 
 
@@ -131,7 +131,28 @@ def relax(
             f"diameters, allowed {OVERLAP_LIMIT}"
         )
     before = _values(simulation)
-    tell = progress or (lambda text, fraction: None)
+    try:
+        steps, stages = _stiffen(simulation, before, progress or (lambda text, fraction: None))
+    except InvalidPacking as error:
+        raise NotConverged(f"{_restless(simulation, before)} ({error})") from None
+    report = simulation.last_report
+    return Relaxed(
+        packing=capture_packing(simulation, source=f"relaxed from {packing.source}".strip()),
+        pressure=pressure,
+        overlap=(deepest, float(report.overlap)),
+        stiffness=tuple(stages),
+        before=before,
+        after=_values(simulation),
+        steps=steps,
+        kinetic_ratio=simulation.kinetic_ratio(),
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _stiffen(
+    simulation: Simulation, before: dict[str, float], tell: Progress
+) -> tuple[int, list[float]]:
+    """To rest at every stiffness in turn; returns the steps made and the stiffnesses."""
     steps = _gather(simulation, tell) if _loose(simulation) else 0
     stages = _stages(_softness(simulation))
     for index, stiffness in enumerate(stages):
@@ -146,19 +167,9 @@ def relax(
             lambda s, energy=energy: s.kinetic_ratio() < energy and _carries(s),
             lambda f, index=index: tell("relaxing overlaps", (index + f) / len(stages)),
         )
-        _check_rest(simulation, before)
-    report = simulation.last_report
-    return Relaxed(
-        packing=capture_packing(simulation, source=f"relaxed from {packing.source}".strip()),
-        pressure=pressure,
-        overlap=(deepest, float(report.overlap)),
-        stiffness=tuple(stages),
-        before=before,
-        after=_values(simulation),
-        steps=steps,
-        kinetic_ratio=simulation.kinetic_ratio(),
-        seconds=time.perf_counter() - began,
-    )
+        if simulation.kinetic_ratio() > ALLOWED_ENERGY or not _carries(simulation):
+            raise NotConverged(_restless(simulation, before))
+    return steps, stages
 
 
 def _simulation(
@@ -199,14 +210,12 @@ def _gather(simulation: Simulation, tell: Progress) -> int:
     return steps
 
 
-def _check_rest(simulation: Simulation, before: dict[str, float]) -> None:
-    if simulation.kinetic_ratio() < ALLOWED_ENERGY and _carries(simulation):
-        return
+def _restless(simulation: Simulation, before: dict[str, float]) -> str:
     phi = simulation.solid_volume / simulation.volume
-    raise NotConverged(
+    return (
         f"the state to start from does not come to rest under p (kinetic energy / pV is "
         f"{simulation.kinetic_ratio():.1e}, allowed {ALLOWED_ENERGY:.0e}; φ {before['phi']:.3f} "
-        f"became {phi:.3f}): its grains must fill its cell (--cell), or compress it first"
+        f"became {phi:.3f}): its grains must fill its cell (--cell)"
     )
 
 
