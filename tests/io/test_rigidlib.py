@@ -70,7 +70,7 @@ def test_what_lacks_is_named(tmp_path: Path) -> None:
     with pytest.raises(MissingData, match=r"posinit\.dat, which has the radii"):
         granufab.read(folder / "PosVel7.dat")
     (folder / "Contact8.dat").write_text("1 0 -1 0 0 0.2 0.01 0.02\n")
-    with pytest.raises(CorruptFile, match=r"Contact8\.dat: has 1 contacts.*count 2"):
+    with pytest.raises(CorruptFile, match=r"Contact8\.dat: ends with row 1, .*count 2"):
         _ = granufab.read(folder, cell=(EDGE, EDGE)).frames[1]
 
 

@@ -39,7 +39,8 @@ def assemble(found: FoundFrame, options: ReadOptions, summary: ImportSummary) ->
         InvalidSettings: an option does not fit the data.
     """
     try:
-        return _assembled(found, options, summary)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
+            return _assembled(found, options, summary)
     except (InvalidSettings, MissingData, CorruptFile):
         raise
     except GranufabError as error:

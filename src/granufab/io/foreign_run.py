@@ -20,6 +20,7 @@ from granufab.fabric.stress import stress_tensor
 from granufab.history import Frame, Run, series_dataset
 from granufab.io.assemble import assemble
 from granufab.io.found import FoundCell, FoundFrame, Source
+from granufab.io.given_files import told_by_system
 from granufab.io.grain_order import in_order
 from granufab.io.import_summary import ImportSummary
 from granufab.io.read_options import ReadOptions
@@ -141,7 +142,10 @@ class ForeignFrames(Sequence[Frame]):
     def _found(self, place: int) -> FoundFrame:
         """A frame as the source gives it; what the beginning parsed already is used once."""
         begun, self._begun = self._begun, None
-        return begun if begun is not None and place == 0 else self._source[place + self._skip]
+        if begun is not None and place == 0:
+            return begun
+        with told_by_system(Path(self.summary.files[0])):
+            return self._source[place + self._skip]
 
     def _frame(self, packing: Packing, cell: FoundCell | None, place: int) -> Frame:
         path = self._strained(packing)

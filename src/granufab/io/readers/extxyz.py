@@ -17,6 +17,7 @@ from granufab.errors import CorruptFile, MissingData
 from granufab.io.foreign_format import ForeignFormat
 from granufab.io.found import FoundCell, FoundFrame, LazyFrames, Source
 from granufab.io.read_options import ReadOptions
+from granufab.io.text_rows import integers, plain_text
 from granufab.io.text_table import parse_table
 from granufab.packing import Array
 
@@ -105,7 +106,7 @@ def _frame(path: Path, block: _Block) -> FoundFrame:
         raise CorruptFile(f"{place}: no property pos of three columns in {list(columns)}")
     with path.open("rb") as stream:
         stream.seek(block.start)
-        text = stream.read(block.end - block.start).decode("utf-8", "replace")
+        text = plain_text(stream.read(block.end - block.start), path, block.line)
     wanted = [column for group in use.values() for column in group]
     table = parse_table(text, wanted, place=str(path), first_line=block.line)
     if len(table) != block.rows:
@@ -120,7 +121,7 @@ def _frame(path: Path, block: _Block) -> FoundFrame:
         place=place,
         position=values["position"],
         radius=radius,
-        number=None if number is None else number.astype(np.int64),
+        number=None if number is None else integers(number, place, "id"),
         mass=_single(values["mass"]),
         velocity=values["velocity"] if values["velocity"].shape[1] == 3 else None,
         spin=values["spin"] if values["spin"].shape[1] == 3 else None,
@@ -180,7 +181,8 @@ def _open(paths: Sequence[Path], options: ReadOptions) -> Source:
         frames += [(path, block) for block in blocks]
         if blocks:
             header = dict(_PAIR.findall(blocks[0].comment))
-            names = _columns(header.get("Properties", "").strip("\"'") or "pos:R:3", str(path))
+            place = f"{path}: line {blocks[0].line - 1}"
+            names = _columns(header.get("Properties", "").strip("\"'") or "pos:R:3", place)
             known = {*_IGNORED, *(name for group in _NAMES.values() for name in group)}
             unknown |= dict.fromkeys(name for name in names if name not in known)
     if not frames:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile
+from granufab.io.text_rows import plain_text
 from granufab.packing import Array, IntArray
 
 __all__ = ["Bodies", "Fields", "Table", "body_starts", "fortran", "read_bodies", "read_text"]
@@ -126,8 +127,9 @@ def read_text(path: Path, start: int = 0, end: int | None = None) -> str:
         stream.seek(start)
         data = stream.read(-1 if end is None else end - start)
     if not data.endswith(b"\n"):
-        raise CorruptFile(f"{path}: is truncated, its last line is not complete")
-    return data.decode("utf-8", "replace")
+        last = start + len(data)
+        raise CorruptFile(f"{path}: is truncated at byte {last}, its last line is not complete")
+    return plain_text(data, path)
 
 
 def _bodies_in(text: str, path: Path) -> Iterator[tuple[int, int, str]]:
@@ -174,7 +176,7 @@ def read_bodies(path: Path) -> Bodies:
     if len(dimensions) != 1 or not text.rstrip().endswith(("$$$$$$", "--")):
         raise CorruptFile(
             f"{path}: expected complete bodies RBDY2 or RBDY3, got {len(numbers)} in "
-            f"{sorted(dimensions)} dimensions"
+            f"{sorted(dimensions)} dimensions up to line {text.count(chr(10))}"
         )
     if len(set(numbers)) != len(numbers):
         raise CorruptFile(f"{path}: a body is described twice")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from granufab.errors import CorruptFile
-from granufab.io.text_rows import checked_count
+from granufab.io.text_rows import checked_count, number_fault, plain_text
 
 __all__ = ["Block", "data_blocks", "fstat_blocks"]
 
@@ -34,7 +34,7 @@ class Block:
         """The rows."""
         with self.path.open("rb") as stream:
             stream.seek(self.start)
-            return stream.read(self.stop - self.start).decode("utf-8", errors="replace")
+            return plain_text(stream.read(self.stop - self.start), self.path, self.line + 1)
 
 
 def data_blocks(path: Path) -> tuple[list[Block], bool]:
@@ -122,10 +122,6 @@ def _fstat_block(path: Path, header: tuple[str, ...], line: int, start: int, sto
 
 
 def _number(word: str, place: str) -> float:
-    try:
-        value = float(word)
-    except ValueError:
-        value = float("nan")
-    if value - value != 0.0:
-        raise CorruptFile(f"{place}: {word!r} is not a finite number")
-    return value
+    if fault := number_fault(word):
+        raise CorruptFile(f"{place}: {fault}")
+    return float(word)

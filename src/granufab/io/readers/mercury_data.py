@@ -150,6 +150,7 @@ def _open(paths: Sequence[Path], options: ReadOptions) -> Source:
     data: list[Block] = []
     fstat: list[Block] = []
     notes: list[str] = []
+    without: list[Path] = []
     grains = 0
     for path in paths:
         if first_bytes(path).lstrip().startswith(b"#"):
@@ -159,12 +160,14 @@ def _open(paths: Sequence[Path], options: ReadOptions) -> Source:
             blocks, whole = data_blocks(path)
             data += blocks
             grains += 1
+        without += [] if blocks else [path]
         if not whole:
             notes.append(f"{path}: the last frame is cut off and left out")
     if not grains:
         raise MissingData(f"{paths[0]}: holds contacts only; give the .data file with the grains")
     if not data or (len(paths) > grains and not fstat):
-        raise CorruptFile(f"{paths[0]}: cut off: no frame is complete")
+        end = f"up to the end at byte {without[0].stat().st_size}"
+        raise CorruptFile(f"{without[0]}: no frame is complete {end}: it is cut off")
     pairs: list[tuple[Block, Block | None]] = [(block, None) for block in data]
     if fstat:
         pairs = _same_times(data, fstat)

@@ -79,7 +79,8 @@ def _parse(path: Path) -> _Restart:
                 if name.lower() in _HEADER:
                     found.words.setdefault(name.lower(), value)
     if not seen:
-        raise CorruptFile(f"{path}: has no line 'Particles N': it is cut off")
+        end = f"up to line {lines.at}"
+        raise CorruptFile(f"{path}: has no line 'Particles N' {end}: it is cut off")
     return found
 
 
@@ -132,7 +133,8 @@ def _frame(path: Path, found: _Restart, turns: int, options: ReadOptions) -> Fou
 def _dimension(found: _Restart, path: Path) -> int:
     value = _header(found, ("systemdimensions", "dim"), path)
     if value not in (2.0, 3.0):
-        raise CorruptFile(f"{path}: has {value} dimensions, expected 2 or 3")
+        what = "missing" if value is None else f"{value:g}"
+        raise CorruptFile(f"{path}: the header's systemDimensions is {what}, expected 2 or 3")
     return int(value)
 
 
@@ -144,7 +146,9 @@ def _header(found: _Restart, names: Sequence[str], path: Path) -> float | None:
             except ValueError:
                 value = float("nan")
             if not np.isfinite(value):
-                raise CorruptFile(f"{path}: {name} is {found.words[name]!r}, expected a number")
+                raise CorruptFile(
+                    f"{path}: the header's {name} is {found.words[name]!r}, expected a number"
+                )
             return value
     return None
 

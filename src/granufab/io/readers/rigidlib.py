@@ -105,7 +105,7 @@ class _Simulation:
         table = _table(path, 7)
         if len(table) != len(self.radius):
             raise CorruptFile(
-                f"{path}: has {len(table)} grains, expected the {len(self.radius)} of posinit.dat"
+                f"{path}: ends with row {len(table)}, but posinit.dat has {len(self.radius)} grains"
             )
         contacts = self._contacts(snapshot, table)
         tilt = 0.0
@@ -133,8 +133,8 @@ class _Simulation:
         pair = integers(table[:, :2].ravel(), str(path), "grain").reshape(-1, 2)
         if grains[:, 6].sum() != 2 * len(table):
             raise CorruptFile(
-                f"{path}: has {len(table)} contacts, but the grains of "
-                f"{self.files.position[snapshot].name} count {grains[:, 6].sum() / 2:g}"
+                f"{path}: ends with row {len(table)}, but the grains of "
+                f"{self.files.position[snapshot].name} count {grains[:, 6].sum() / 2:g} contacts"
             )
         wrong = (pair < 0) | (pair >= len(grains))
         if wrong.any():
@@ -166,7 +166,10 @@ def _edges(given: dict[str, str], path: Path | None, options: ReadOptions, place
             f"{place}: no Parameters_final.dat, so the box is unknown; give --cell LX,LY"
         )
     if not (edges > 0).all():
-        raise CorruptFile(f"{path or place}: the box has edges {edges.tolist()}, must be > 0")
+        raise CorruptFile(
+            f"{path or place}: column 2 of boxVec1x, boxVec2y: the box has edges "
+            f"{edges.tolist()}, must be > 0"
+        )
     return edges
 
 

@@ -61,7 +61,7 @@ def _pieces(file: VtkFile, tag: str, counts: Sequence[str]) -> Columns:
 def _points(file: VtkFile) -> Array:
     columns = list(_pieces(file, "Points", ("NumberOfPoints",)).values())
     if not columns or columns[0].ndim != 2 or columns[0].shape[1] != 3:
-        raise file.corrupt("has no points of three coordinates")
+        raise file.corrupt("array Points is missing, or has no three coordinates")
     return columns[0].astype(float)
 
 
