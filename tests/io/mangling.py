@@ -36,6 +36,7 @@ __all__ = [
     "check_error",
     "check_mutations",
     "check_truncations",
+    "same_states",
     "states",
 ]
 
@@ -53,7 +54,7 @@ RESIDENT = 64 * 2**20
 PLACE = re.compile(
     r"\b(line|byte|row|frame|step|body|grain|contact|interaction|item) \d"
     r"|\bt = [-\d]|\b\d+ bytes\b|\bis empty\b|\bheader\b"
-    r"|\b[A-Z]\w*/\w+|\b(column|array|dataset|name) '?\w+|: \$?\w+ (is|has) (missing|'|\d)"
+    r"|\b[A-Z]\w*/\w+|\b(column|array|dataset|value of|name) '?\w+|: \$?\w+ (is|has) (missing|'|\d)"
 )
 """Where in the file: a number of something, a dataset of HDF5, a named column or array."""
 REMEDY = re.compile(
@@ -141,6 +142,7 @@ class Attempts:
 
     def __init__(self, folder: Path, read: Callable[[], Run]) -> None:
         self.folder, self.read, self.count = folder, read, 0
+        self.error: GranufabError | None = None
         self.wanted, error = states(read())
         assert error is None and self.wanted
         tracemalloc.start()
@@ -178,6 +180,7 @@ class Attempts:
         finally:
             tracemalloc.stop()
         assert peak <= self.limit(), f"{what}: {peak} bytes, allowed {self.limit()}"
+        self.error = error
         if error is not None:
             names = [one.name for one in (self.folder, *self.folder.rglob("*"))]
             check_error(error, names, what)
@@ -187,6 +190,11 @@ class Attempts:
         """What all attempts took outside of Python."""
         grown = _resident() - self._resident
         assert grown <= RESIDENT, f"{self.folder}: the process has grown by {grown} bytes"
+
+
+def same_states(got: Sequence[State], right: Sequence[State]) -> bool:
+    """Whether all frames hold the same numbers, to the last bit."""
+    return len(got) == len(right) and all(map(_same, got, right))
 
 
 def _same(got: State, right: State) -> bool:

@@ -420,9 +420,10 @@ def _lmgc90(folder: Path) -> Example:
     (folder / "Vloc_Rloc.INI").write_text(listed)
     return Example(
         key="lmgc90", folder=folder, series=True,
-        parts=(Part(name="BODIES.DAT", number=fortran(RADIUS).strip()),
+        parts=(Part(name="BODIES.DAT", number=fortran(RADIUS).strip(), counts=(r"RBDY2 +(\d+)",)),
                Part(name="DOF.INI", number=fortran(0.07).strip()),
-               Part(name="Vloc_Rloc.INI", number=fortran(PUSH).strip(), counted=False)),
+               Part(name="Vloc_Rloc.INI", number=fortran(PUSH).strip(), counted=False,
+                    counts=(r"RBDY2 +(\d+)", r"icdan  DKDKx +(\d+)"))),
     )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -37,17 +38,18 @@ def check_given(known: ForeignFormat, paths: Sequence[Path]) -> None:
             raise MissingData(f"{path}: no such file")
         if not path.is_dir():
             with told_by_system(path), path.open("rb") as stream:
-                check_readable(path, stream.read(8))
+                check_readable(path, stream.read(8), byte_order_mark=known.byte_order_mark)
         elif not known.matches(path, b""):
             raise MissingData(f"{path}: is no folder of {known.name}; give the files in it")
 
 
-def check_readable(path: Path, head: bytes) -> None:
+def check_readable(path: Path, head: bytes, *, byte_order_mark: bool = False) -> None:
     """Refuse a file that must be unpacked, or saved in another encoding, before it is read.
 
     Args:
         path: the file.
         head: its first bytes.
+        byte_order_mark: whether it may begin with one.
     Raises:
         UnknownFormat: says what to do.
     """
@@ -58,6 +60,10 @@ def check_readable(path: Path, head: bytes) -> None:
             )
     if head.startswith(_WIDE):
         raise UnknownFormat(f"{path}: is text in UTF-16; save it as UTF-8")
+    if head.startswith(BOM_UTF8) and not byte_order_mark:
+        raise UnknownFormat(
+            f"{path}: begins with a byte order mark; save it as plain text or UTF-8 without one"
+        )
 
 
 @contextmanager

@@ -8,9 +8,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile
-from granufab.packing import Array, IntArray
+from granufab.packing import IntArray
 
 __all__ = [
     "checked_count",
@@ -52,6 +53,8 @@ def plain_text(data: bytes, path: Path, first_line: int = 1) -> str:
     Raises:
         CorruptFile: it holds zeros, as a lost block of a disk or a binary file does.
     """
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise CorruptFile(f"{path}: byte 0: is text in UTF-16; save it as UTF-8")
     zero = data.find(b"\0")
     if zero >= 0:
         line = first_line + data.count(b"\n", 0, zero)
@@ -80,7 +83,7 @@ def number_fault(word: str) -> str:
     return "" if math.isfinite(value) else f"{shown!r} is not a finite number"
 
 
-def integers(column: Array, place: str, what: str) -> IntArray:
+def integers(column: NDArray, place: str, what: str) -> IntArray:
     """A column of numbers as integers.
 
     Args:
@@ -90,6 +93,8 @@ def integers(column: Array, place: str, what: str) -> IntArray:
     Raises:
         CorruptFile: one of them is no integer.
     """
+    if column.dtype.kind == "i" and column.dtype.itemsize <= 8:
+        return column.astype(np.int64)
     good = np.isfinite(column) & (np.abs(column) < LARGEST)
     good &= np.where(good, column, 0.5) == np.floor(np.where(good, column, 0.0))
     if not good.all():
@@ -134,7 +139,7 @@ def in_order(paths: Iterable[Path]) -> list[Path]:
     return sorted(
         paths,
         key=lambda path: [
-            (int(part), "") if part.isdigit() else (-1, part)
+            (int(part), "") if part.isdecimal() else (-1, part)
             for part in re.split(r"(\d+)", path.name)
         ],
     )

@@ -59,14 +59,13 @@ def parse_table(
         CorruptFile: a line has other columns or something that is no finite number; names the line.
     """
     rows = _rows(text, columns, comments, delimiter)
-    try:
+    try:  # comments have no mark within a line: 1.#IND is no 1
         first = next(rows, None)
         if first is None:
             return np.zeros((0, len(use)))
         table = np.loadtxt(
-            chain([first], rows), usecols=tuple(use), comments=comments, delimiter=delimiter,
-            ndmin=2,
-        ).reshape(-1, len(use))  # fmt: skip
+            chain([first], rows), usecols=tuple(use), comments=None, delimiter=delimiter, ndmin=2
+        ).reshape(-1, len(use))
         if np.isfinite(table).all():
             return table
     except (ValueError, IndexError):

@@ -78,8 +78,8 @@ class VtkFile:
     def count(self, piece: ElementTree.Element, name: str) -> int:
         """A count that a piece declares, 0 where it does not."""
         text = piece.get(name, "0")
-        if not text.isdigit():
-            raise self.corrupt(f"{name} is {text!r}, expected a whole number")
+        if not re.fullmatch(r"[0-9]{1,15}", text):
+            raise self.corrupt(f"array lengths: {name} is {text[:40]!r}, expected a whole number")
         return int(text)
 
     def array(self, element: ElementTree.Element, rows: int | None = None) -> NDArray:
@@ -94,9 +94,9 @@ class VtkFile:
         name = element.get("Name", "array")
         kind = TYPES.get(element.get("type", ""))
         width = element.get("NumberOfComponents", "1")
-        if kind is None or not width.isdigit() or not 1 <= int(width) <= 1000:
+        if kind is None or not re.fullmatch(r"[1-9][0-9]{0,2}", width):
             kind = element.get("type")
-            raise self.corrupt(f"array {name} has type {kind!r} of {width} components")
+            raise self.corrupt(f"array {name} has type {kind!r} of {width[:40]} components")
         values = self._decoded(element, np.dtype(self._order + kind), name)
         if len(values) % int(width) or rows not in (None, len(values) // int(width)):
             raise self.corrupt(

@@ -185,6 +185,7 @@ class _Sample:
         rows = self.contacts.rows(key)
         says: dict[str, Any] = dict(options.columns.get("conventions", {}))
         return FoundContacts(
+            place=rows.place,
             first=rows.whole("i"),
             second=rows.whole("j"),
             wall=rows["wall"] != 0 if "wall" in rows else None,
@@ -274,5 +275,9 @@ def _base(contacts: FoundContacts, position: Array, radius: Array | None) -> int
 
 
 FORMAT = ForeignFormat(
-    key="csv", name="tables of text (grains, contacts)", matches=_matches, open=_open
+    key="csv",
+    name="tables of text (grains, contacts)",
+    matches=_matches,
+    open=_open,
+    byte_order_mark=True,
 )

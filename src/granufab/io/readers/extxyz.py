@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from granufab.errors import CorruptFile, MissingData
+from granufab.errors import CorruptFile
 from granufab.io.foreign_format import ForeignFormat
 from granufab.io.found import FoundCell, FoundFrame, LazyFrames, Source
 from granufab.io.read_options import ReadOptions
@@ -86,10 +86,10 @@ def _columns(text: str, place: str) -> dict[str, list[int]]:
     words = text.split(":")
     columns: dict[str, list[int]] = {}
     place_now = 0
-    if len(words) % 3 or not all(width.isdigit() for width in words[2::3]):
+    if len(words) % 3 or not all(re.fullmatch(r"[0-9]{1,3}", width) for width in words[2::3]):
         raise CorruptFile(f"{place}: Properties={text!r} is no list of name:type:width")
     for name, width in zip(words[::3], words[2::3], strict=True):
-        columns[name] = list(range(place_now, place_now + min(int(width), 1000)))
+        columns[name] = list(range(place_now, place_now + int(width)))
         place_now += int(width)
     return columns
 
@@ -186,7 +186,7 @@ def _open(paths: Sequence[Path], options: ReadOptions) -> Source:
             known = {*_IGNORED, *(name for group in _NAMES.values() for name in group)}
             unknown |= dict.fromkeys(name for name in names if name not in known)
     if not frames:
-        raise MissingData(f"{paths[0]}: holds no frame")
+        raise CorruptFile(f"{paths[0]}: holds no frame in {paths[0].stat().st_size} bytes")
     return LazyFrames(
         count=len(frames),
         parse=lambda index: _frame(*frames[index]),

@@ -91,7 +91,7 @@ def _state(path: Path, options: ReadOptions) -> FoundFrame:
 
 def _count(parsed: _File) -> int:
     words = parsed.header.get("atoms", [])
-    if len(words) != 1 or not words[0].isdigit() or len(words[0]) > 15:
+    if len(words) != 1 or not words[0].isdecimal() or len(words[0]) > 15:
         raise CorruptFile(f"{parsed.path}: the header has no number of atoms")
     return int(words[0])
 

@@ -20,10 +20,10 @@ ROUND = ("DISKx", "SPHER")
 GRAINS = (*ROUND, "POLYG", "POLYR", "CYLND")
 """Contactors of grains; all others (JONCx, PLANx, xKSID, …) are walls."""
 
-_VALUE = r"[ \t]*(?:=[ \t]*)?([+-]?(?:\d+\.\d*|\.\d+)(?:[DdEe][+-]?\d+|[+-]\d+)?)(?![\w.*+-])"
+_VALUE = r"[ \t]*(?:=[ \t]*)?([+-]?(?:\d+\.\d*|\.\d+)(?:[DdEe][+-]?\d+|[+-]\d+)?)(?![\w.,*+#-])"
 _FIELD = re.compile(r"([A-Za-z]+\d?(?:\(\d\)|/H)?)" + _VALUE)
 _BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
-_BODY = re.compile(r"\$bdyty[^\n]*\n[ \t]*RBDY([23])[ \t]+(\d+)")
+_BODY = re.compile(r"\$bdyty[^\n]*\n[ \t]*RBDY([23])[ \t]+(\d{1,15})(?!\d)")
 
 
 def fortran(word: str) -> float:
@@ -56,7 +56,9 @@ class Fields:
         values = [self._values.get(name, np.nan) for name in names]
         if not np.isfinite(values).all():
             wrong = names[int(np.argmin(np.isfinite(values)))]
-            raise CorruptFile(f"{self._place}: {wrong} is missing or no number")
+            raise CorruptFile(
+                f"{self._place}: {wrong} is missing or no number with a decimal point"
+            )
         return values
 
 
@@ -93,7 +95,9 @@ class Table:
         often = np.bincount(sound[sound >= 0], minlength=len(wanted))
         wrong = int(np.argmax(often != 1)) if len(wanted) else 0
         where = self._text[self._starts[wrong] :][:60].split(maxsplit=3)[:3] if len(wanted) else []
-        raise CorruptFile(f"{self._place}, {' '.join(where)}: {name} is missing or no number")
+        raise CorruptFile(
+            f"{self._place}, {' '.join(where)}: {name} is missing or no number with a decimal point"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

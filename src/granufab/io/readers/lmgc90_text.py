@@ -33,10 +33,10 @@ from granufab.packing import Array, IntArray
 __all__ = ["FORMAT", "NO_CELL", "points_apart"]
 
 NO_CELL = "the cell is not in LMGC90's files; give --cell (and --periodic) where there is one"
-_STEP = re.compile(rb"\$steps\s+(\d+)\s+time=\s*(\S+)")
+_STEP = re.compile(rb"\$steps\s+(\d{1,18})\s+time=\s*(\S+)")
 _PAIR = re.compile(
-    r"\$icdan[ \t]+(\w{5})[ \t]+(\d+)[^\n]*\n[^\n]*\n[ \t]*(\w{5})[ \t]+(\d+)"
-    r"(?:[ \t]+\w{5}[ \t]+\d+)+?[ \t]+\S+[ \t]+(\w{5})[ \t]+(\d+)[ \t]+\w{5}[ \t]"
+    r"\$icdan[ \t]+(\w{5})[ \t]+(\d{1,15})\b[^\n]*\n[^\n]*\n[ \t]*(\w{5})[ \t]+(\d{1,15})"
+    r"(?:[ \t]+\w{5}[ \t]+\d+)+?[ \t]+\S+[ \t]+(\w{5})[ \t]+(\d{1,15})[ \t]+\w{5}[ \t]"
 )
 
 
@@ -123,6 +123,7 @@ def _contacts(state: _State, bodies: Bodies) -> FoundContacts:
     pairs = np.array([(int(one[4]), int(one[6])) for one in records], np.int64).reshape(-1, 2)
     rigid = [one[3].startswith("RBDY") and one[5].startswith("RBDY") for one in records]
     return FoundContacts(
+        place=place,
         first=pairs[:, 0],
         second=pairs[:, 1],
         wall=~np.array(rigid, bool),

@@ -74,6 +74,8 @@ def _parse(path: Path) -> _Restart:
             found.listed = True
             for _ in range(lines.count(words[1], "interactions")):
                 _add_interaction(found, lines.needed("interactions"), lines)
+        elif seen and {"particleIds", "particleWallIds", "BaseParticle"} & set(words):
+            raise CorruptFile(f"{lines.place} is a row more than the list before it announces")
         elif not seen:
             for name, value in pairwise(words):
                 if name.lower() in _HEADER:

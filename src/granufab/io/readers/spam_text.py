@@ -69,6 +69,7 @@ def _box(spheres: Path) -> FoundCell | None:
 def _contacts(path: Path) -> FoundContacts:
     table = number_table(path, range(6), columns=10)
     return FoundContacts(
+        place=str(path),
         first=integers(table[:, 0], str(path), "idA"),
         second=integers(table[:, 1], str(path), "idB"),
         normal=table[:, 2:5],
