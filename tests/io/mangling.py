@@ -53,8 +53,8 @@ RESIDENT = 64 * 2**20
 
 PLACE = re.compile(
     r"\b(line|byte|row|frame|step|body|grain|contact|interaction|item) \d"
-    r"|\bt = [-\d]|\b\d+ bytes\b|\bis empty\b|\bheader\b"
-    r"|\b[A-Z]\w*/\w+|\b(column|array|dataset|value of|name) '?\w+|: \$?\w+ (is|has) (missing|'|\d)"
+    r"|\bt = [-\d]|\b\d+ bytes\b|\bheader\b"
+    r"|\b[A-Z]\w*/\w+|\b(column|array|dataset|value of) \w+"
 )
 """Where in the file: a number of something, a dataset of HDF5, a named column or array."""
 REMEDY = re.compile(
