@@ -10,6 +10,9 @@ from mangling import check_mutations, check_truncations
 from one_of_each import COUNT, grid
 from one_of_each_binary import EXAMPLES
 
+STREAMS = ("lammps_dump", "liggghts_local", "mercury", "extxyz")
+"""Frames one after another: those before a cut are read."""
+
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_the_examples_are_what_was_written(tmp_path: Path, name: str) -> None:
@@ -35,9 +38,12 @@ def test_the_examples_are_what_was_written(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_cuts(tmp_path: Path, name: str) -> None:
     example = EXAMPLES[name](tmp_path)
-    for part in example.parts:
-        partial = check_truncations(tmp_path / part.name, example.read, counted=part.counted)
-        assert example.series or partial == 0
+    partial = [
+        check_truncations(tmp_path / part.name, example.read, counted=part.counted)
+        for part in example.parts
+    ]
+    assert example.series or not any(partial)
+    assert name not in STREAMS or min(partial) > 20
 
 
 @pytest.mark.parametrize("name", EXAMPLES)

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lammps_text import Lattice, atoms_text, contacts, lattice, local_text
-from mangling import check_mutations, check_truncations
 
 import granufab
 from granufab.errors import CorruptFile, InvalidSettings, MissingData
@@ -339,19 +338,6 @@ def test_a_series_cut_off_gives_its_complete_frames(tmp_path: Path) -> None:
     run = granufab.read(atoms, local)
     assert len(run.frames) == 2
     assert any("left out at the end: step 2 with" in n for n in run.frames.summary.notes)  # type: ignore[attr-defined]
-
-
-def test_mangled_atoms(tmp_path: Path) -> None:
-    paths = _write(tmp_path, [lattice(k, 0.1 * k, side=2) for k in range(3)])
-    columns = {"contacts": {"order": "index i j dist fx fy fz ftx fty ftz"}}
-    assert check_truncations(paths[0], lambda: granufab.read(*paths, columns=columns)) > 20
-    assert 0 < check_mutations(paths[0], lambda: granufab.read(*paths, columns=columns)) < 200
-
-
-def test_mangled_contacts(tmp_path: Path) -> None:
-    paths = _write(tmp_path, [lattice(k, 0.1 * k, side=2) for k in range(3)])
-    assert check_truncations(paths[1], lambda: granufab.read(*paths)) > 20
-    assert 0 < check_mutations(paths[1], lambda: granufab.read(*paths)) < 200
 
 
 def test_a_count_that_the_file_cannot_hold_takes_no_memory(tmp_path: Path) -> None:

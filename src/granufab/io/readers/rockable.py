@@ -24,7 +24,7 @@ from granufab.io.found import FoundCell, FoundContacts, FoundFrame, LazyFrames, 
 from granufab.io.read_options import ReadOptions
 from granufab.io.readers.keyword_lines import Lines
 from granufab.io.readers.rockable_shapes import Shape, read_shapes
-from granufab.io.text_rows import first_bytes, in_order
+from granufab.io.text_rows import first_bytes, in_order, number_fault
 from granufab.packing import Array
 
 __all__ = ["FORMAT"]
@@ -130,13 +130,14 @@ def _frame(path: Path, shapes_file: Path) -> FoundFrame:
 
 def _number(conf: _Conf, name: str, path: Path, default: float) -> float:
     words = conf.words.get(name)
-    try:
-        value = default if words is None else float(words[0])
-    except ValueError:
-        value = float("nan")
-    if not np.isfinite(value) or abs(value) > 1e15:
-        raise CorruptFile(f"{path}: {name} is {(words or [''])[0]!r}, expected a number")
-    return value
+    if words is None:
+        return default
+    fault = number_fault(words[0])
+    if not fault and abs(float(words[0])) > 1e15:
+        fault = f"{words[0][:40]} is too large"
+    if fault:
+        raise CorruptFile(f"{path}: the header's {name}: {fault}")
+    return float(words[0])
 
 
 def _mass(conf: _Conf, body: Array, shapes: Sequence[Shape]) -> Array | None:
