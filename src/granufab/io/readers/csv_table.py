@@ -83,7 +83,7 @@ def _check_map(columns: Mapping[str, Mapping[str, str | int]]) -> None:
                 f"columns: section [{section}] is unknown, allowed: {', '.join(_SECTIONS)}"
             )
     for name, value in columns.get("conventions", {}).items():
-        if value not in _CONVENTIONS.get(name, ()):
+        if isinstance(value, bool) or value not in _CONVENTIONS.get(name, ()):
             words = "; ".join(f"{key} = {a!r} or {b!r}" for key, (a, b) in _CONVENTIONS.items())
             raise InvalidSettings(f"columns: [conventions] {name} = {value!r}, allowed: {words}")
 
