@@ -13,7 +13,8 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from one_of_each import COUNT, EDGE, RADIUS, TEXT, Example, Part, fortran, grid, lmgc90_bodies, row
+from one_of_each import COUNT, EDGE, RADIUS, Example, Part, grid, row
+from one_of_each_text import TEXT, fortran, lmgc90_bodies
 
 __all__ = ["EXAMPLES"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from mangling import states
-from one_of_each import TEXT
+from one_of_each_text import TEXT
 
 import granufab
 from granufab.cli.foreign import ForeignOptions
