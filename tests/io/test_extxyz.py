@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mangling import check_mutations, check_truncations
 
 import granufab
 from granufab.errors import CorruptFile, MissingData
@@ -66,9 +65,3 @@ def test_a_count_that_the_file_cannot_hold(tmp_path: Path) -> None:
     path.write_text("99999999999\nProperties=species:S:1:pos:R:3\nH 0 0 0\n")
     with pytest.raises(CorruptFile, match=r"a\.xyz: line 1 declares 99999999999 rows"):
         granufab.read(path, radius=1.0)
-
-
-def test_damage(tmp_path: Path) -> None:
-    path = _file(tmp_path / "a.xyz")
-    assert check_truncations(path, lambda: granufab.read(path)) > 50
-    check_mutations(path, lambda: granufab.read(path))

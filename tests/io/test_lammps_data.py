@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lammps_text import contacts, lattice
-from mangling import check_mutations, check_truncations
 
 import granufab
 from granufab.errors import CorruptFile, MissingData
@@ -94,10 +93,3 @@ def test_points_need_a_radius(tmp_path: Path) -> None:
     with pytest.raises(MissingData, match="give --radius"):
         granufab.read(path)
     assert (granufab.read(path, radius=0.5).frames[0].packing.grains.radius == 0.5).all()
-
-
-def test_mangled_files(tmp_path: Path) -> None:
-    path = tmp_path / "in.data"
-    path.write_text(_text())
-    assert check_truncations(path, lambda: granufab.read(path, format="lammps_data")) == 0
-    assert 0 < check_mutations(path, lambda: granufab.read(path, format="lammps_data")) < 200

@@ -8,11 +8,8 @@ import h5py
 import numpy as np
 import pytest
 from foreign_samples import sample
-from foreign_states import touching
-from mangling import check_mutations, check_truncations
 
 import granufab
-from granufab.io.writers import write_vtkhdf
 
 
 def _file(path: Path, sign: float, *, overlap: bool = True, said: str = "") -> Path:
@@ -82,13 +79,6 @@ def test_the_sample_of_5_spheres_on_a_wall() -> None:
     assert packing.grains.count == 5
     assert packing.contacts is not None
     assert packing.contacts.count == 0
-
-
-def test_damage(tmp_path: Path) -> None:
-    path = tmp_path / "a.vtkhdf"
-    write_vtkhdf(touching(3, count=12), path)
-    check_truncations(path, lambda: granufab.read(path, format="vtkhdf"))
-    assert check_mutations(path, lambda: granufab.read(path, format="vtkhdf")) > 0
 
 
 def test_more_declared_than_stored(tmp_path: Path) -> None:

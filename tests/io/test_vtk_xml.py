@@ -11,12 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from foreign_states import touching
-from mangling import check_mutations, check_truncations
 
 import granufab
 from granufab.errors import CorruptFile, GranufabError, MissingData, UnknownFormat
-from granufab.io.writers import write_vtp
 
 PLACE = np.array([[0, 0, 0], [0.9, 0, 0.1], [0.3, 0.8, 0], [2, 2, 2]], float)
 RADIUS = np.array([0.5, 0.5, 0.4, 0.3])
@@ -166,17 +163,3 @@ def test_a_bomb_is_refused(tmp_path: Path) -> None:
     store.file(path, "PolyData", inside)
     with pytest.raises(CorruptFile, match="expected 8"):
         granufab.read(path)
-
-
-@pytest.mark.parametrize(("form", "pack"), [("ascii", ""), ("raw", "ZLib")])
-def test_damaged_grains(tmp_path: Path, form: str, pack: str) -> None:
-    path = _grains(tmp_path / "a.vtp", form, pack)
-    check_truncations(path, lambda: granufab.read(path), count=100)
-    assert check_mutations(path, lambda: granufab.read(path), count=100) > 5
-
-
-def test_damaged_pair(tmp_path: Path) -> None:
-    files = write_vtp(touching(2, count=12), tmp_path / "a.vtp")
-    for file in files:
-        check_truncations(file, lambda: granufab.read(*files), count=100)
-        assert check_mutations(file, lambda: granufab.read(*files), count=100) > 5

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile, GranufabError, InvalidPacking, InvalidSettings, MissingData
+from granufab.io.distinct_bodies import check_distinct
 from granufab.io.found import FoundCell, FoundContacts, FoundFrame
 from granufab.io.import_summary import ImportSummary
 from granufab.io.nearest_image import nearest_images
@@ -39,7 +40,8 @@ def assemble(found: FoundFrame, options: ReadOptions, summary: ImportSummary) ->
         InvalidSettings: an option does not fit the data.
     """
     try:
-        return _assembled(found, options, summary)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
+            return _assembled(found, options, summary)
     except (InvalidSettings, MissingData, CorruptFile):
         raise
     except GranufabError as error:
@@ -50,7 +52,7 @@ def _assembled(found: FoundFrame, options: ReadOptions, summary: ImportSummary) 
     axes = _axes(found, options, summary)
     keep = _kept_bodies(found, options, summary)
     number = np.arange(len(keep)) if found.number is None else np.asarray(found.number, np.int64)
-    _check_unique(number, found.place)
+    check_distinct(found)
     position = np.asarray(found.position, float)[keep][:, axes]
     if len(position) == 0:
         raise MissingData(f"{found.place}: this frame has no grains")
@@ -121,12 +123,6 @@ def _kept_bodies(
         return np.ones(count, bool)
     summary.walls_dropped += int(found.wall.sum())
     return ~found.wall
-
-
-def _check_unique(number: IntArray, place: str) -> None:
-    unique, count = np.unique(number, return_counts=True)
-    if len(unique) != len(number):
-        raise CorruptFile(f"{place}: body {int(unique[np.argmax(count)])} is listed more than once")
 
 
 def _radius(found: FoundFrame, options: ReadOptions) -> Array:

@@ -23,7 +23,7 @@ def read_column_map(file: Path | str) -> dict[str, dict[str, Any]]:
         found = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise MissingData(f"{file}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # nested too deep, a number of 5000 digits
         raise InvalidSettings(f"{file}: is not TOML ({error})") from None
     for name, section in found.items():
         if not isinstance(section, dict):

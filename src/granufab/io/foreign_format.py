@@ -23,6 +23,7 @@ class ForeignFormat:
             completes, from its path and first bytes (none for a folder).
         open: open files that belong together, in the order given; parses no frame yet beyond
             what finding them takes. Raises MissingData where a part is missing, and says which.
+        byte_order_mark: whether its text may begin with one, as spreadsheets write it.
         completed_by: keys of formats whose files, given before or after one of this, belong to
             it.
     """
@@ -32,3 +33,4 @@ class ForeignFormat:
     matches: Callable[[Path, bytes], bool]
     open: Callable[[Sequence[Path], ReadOptions], Source]
     completed_by: tuple[str, ...] = ()
+    byte_order_mark: bool = False

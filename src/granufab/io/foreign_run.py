@@ -20,6 +20,7 @@ from granufab.fabric.stress import stress_tensor
 from granufab.history import Frame, Run, series_dataset
 from granufab.io.assemble import assemble
 from granufab.io.found import FoundCell, FoundFrame, Source
+from granufab.io.given_files import told_by_system
 from granufab.io.grain_order import in_order
 from granufab.io.import_summary import ImportSummary
 from granufab.io.read_options import ReadOptions
@@ -229,7 +230,10 @@ class ForeignFrames(Sequence[Frame]):
     def _found(self, number: int) -> FoundFrame:
         """A frame as the source gives it; what the beginning parsed already is used once."""
         begun, self._begun = self._begun, None
-        return begun if begun is not None and number == 0 else self._source[number + self._empty]
+        if begun is not None and number == 0:
+            return begun
+        with told_by_system(Path(self.summary.files[0])):
+            return self._source[number + self._empty]
 
     def _frame(self, packing: Packing, cell: FoundCell | None, number: int) -> Frame:
         assert self._start is not None

@@ -17,6 +17,7 @@ from granufab.history import Run
 from granufab.io.checked_hdf5 import HDF5_SIGNATURE, is_run_file
 from granufab.io.foreign_format import ForeignFormat
 from granufab.io.foreign_run import foreign_run
+from granufab.io.given_files import check_given, check_readable, told_by_system
 from granufab.io.read_options import ReadOptions
 from granufab.io.readers import foreign_formats
 from granufab.io.run_reader import read_run
@@ -58,6 +59,7 @@ def detect(path: Path | str) -> Format | ForeignFormat:
     for known in (*FORMATS, *foreign_formats()):
         if known.matches(path, head):
             return known
+    check_readable(path, head)
     kind = "is empty" if not head and not path.is_dir() else "is of no known format"
     if head.startswith(HDF5_SIGNATURE):
         kind = "is HDF5 of no known kind"
@@ -97,12 +99,11 @@ def read(path: Path | str, *more: Path | str, format: str | None = None, **optio
         if len(paths) > 1:
             raise InvalidSettings(f"{paths[1]}: a run file is complete, give one at a time")
         return known.read(paths[0])
-    for one in paths:
-        if not one.exists():
-            raise MissingData(f"{one}: no such file")
+    check_given(known, paths)
     if format is None:
         known = _completed(known, paths[1:])
-    return foreign_run(known.name, paths, known.open(paths, given), given)
+    with told_by_system(paths[0]):
+        return foreign_run(known.name, paths, known.open(paths, given), given)
 
 
 def _completed(known: ForeignFormat, more: Sequence[Path]) -> ForeignFormat:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from granufab.errors import CorruptFile
+from granufab.io.text_rows import number_fault
 from granufab.packing import Array, IntArray
 
 __all__ = ["VtkPoints", "is_legacy_vtk", "read_legacy_vtk"]
@@ -70,8 +71,8 @@ def read_legacy_vtk(path: Path) -> VtkPoints:
     found, owner = VtkPoints(), "field"
     while text.more():
         owner = _section(text, found, owner)
-    if not text.pointed:
-        raise text.wrong("the file ends without POINTS")
+    if not text.points:
+        raise text.wrong("no POINTS up to the end")
     return found
 
 
@@ -81,7 +82,7 @@ def _section(text: _Text, found: VtkPoints, owner: str) -> str:
     word = words[0]
     if word == "POINTS":
         count = text.whole(words, 1)
-        text.pointed = True
+        text.points = True
         found.position = text.values(3 * count, words[2] if len(words) > 2 else "").reshape(-1, 3)
     elif word in _CELLS:
         lines = _read_cells(text, text.whole(words, 1), text.whole(words, 2))
@@ -155,7 +156,7 @@ class _Text:
 
     def __init__(self, path: Path) -> None:
         self.path, self.bytes, self.at = path, path.read_bytes(), 0
-        self.binary, self.items, self.pointed = False, 0, False
+        self.binary, self.items, self.points = False, 0, False
 
     def wrong(self, what: str) -> CorruptFile:
         return CorruptFile(f"{self.path}: byte {self.at}: {what}")
@@ -205,6 +206,9 @@ class _Text:
         if size > len(self.bytes) - self.at:
             raise self.wrong(f"{size} bytes expected, the file has {len(self.bytes) - self.at}")
         values = np.frombuffer(self.bytes, ">" + kind, count, self.at).astype(np.float64)
+        if not np.isfinite(values).all():
+            self.at += int(np.argmin(np.isfinite(values))) * np.dtype(kind).itemsize
+            raise self.wrong("this number is not finite")
         self.at += size
         return values
 
@@ -220,7 +224,10 @@ class _Text:
             raise self.wrong("the file ends within a number")
         try:
             values = np.array(words).astype(np.float64)
-        except ValueError as error:
-            raise self.wrong(str(error)) from None
+        except ValueError:
+            values = np.array([np.nan])
+        if not np.isfinite(values).all():
+            plain = (word.decode(errors="replace") for word in words)
+            raise self.wrong(next(filter(None, map(number_fault, plain)), "no numbers"))
         self.at = end
         return values

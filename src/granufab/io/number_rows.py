@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile
+from granufab.io.text_rows import number_fault
 from granufab.kernels.number_text import parse_rows
 from granufab.packing import Array
 
@@ -81,13 +82,10 @@ def _fill(
 
 
 def _slowly(word: bytes, place: str) -> float:
-    try:
-        if b"_" in word:
-            raise ValueError
-        return float(word.replace(b"D", b"E").replace(b"d", b"e"))
-    except ValueError:
-        text = word[:40].decode(errors="replace")
-        raise CorruptFile(f"{place}: {text!r} is not a number") from None
+    text = word.decode(errors="replace").replace("D", "E").replace("d", "e")
+    if number_fault(text):
+        raise CorruptFile(f"{place}: {number_fault(word.decode(errors='replace'))}")
+    return float(text)
 
 
 def _blocks(path: Path, start: int, stop: int) -> Iterator[bytes]:

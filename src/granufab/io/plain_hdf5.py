@@ -43,14 +43,17 @@ def open_plain(path: Path) -> Iterator[PlainHdf5]:
     Raises:
         CorruptFile: it cannot be opened, or what the block meets shows that it is damaged.
     """
+    checked: PlainHdf5 | None = None
     try:
         with h5py.File(path, "r", locking="best-effort") as file:
-            yield PlainHdf5(file, path)
+            checked = PlainHdf5(file, path)
+            yield checked
     except GranufabError:
         raise
     except BROKEN as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise CorruptFile(f"{path}: is truncated or damaged ({reason})") from None
+        where = f"of {path.stat().st_size} bytes" if checked is None else f"at {checked.at}"
+        raise CorruptFile(f"{path}: is truncated or damaged {where} ({reason})") from None
 
 
 class PlainHdf5:
@@ -59,12 +62,14 @@ class PlainHdf5:
     Args:
         file: the open file.
         path: for messages.
+    Attributes:
+        at: what was looked up last, for messages.
     """
 
     def __init__(self, file: h5py.File, path: Path) -> None:
         self._file = file
         self._hard: dict[str, bool] = {}
-        self.path = path
+        self.path, self.at = path, "dataset /"
 
     def corrupt(self, text: str) -> CorruptFile:
         """The exception for a contradiction in this file."""
@@ -132,6 +137,7 @@ class PlainHdf5:
 
     def _node(self, name: str) -> Any:
         parts = [part for part in name.split("/") if part]
+        self.at = f"dataset {name}"
         for depth in range(1, len(parts) + 1):
             above = "/".join(parts[:depth])
             if above not in self._hard:

@@ -10,6 +10,7 @@ import numpy as np
 
 from granufab.errors import CorruptFile
 from granufab.io.table_layout import TableLayout
+from granufab.io.text_rows import number_fault, plain_text
 from granufab.io.text_table import parse_table
 from granufab.packing import Array, IntArray
 
@@ -97,7 +98,7 @@ class FramedTable:
             self.spans = {0.0: Span(start=layout.start, end=size, line=layout.line)}
         else:
             self.spans = self._indexed(roles[self.key])
-        if size > layout.start and not _ends_with_a_line(path, size):
+        if size and not _ends_with_a_line(path, size):
             self._drop_last()
 
     def _drop_last(self) -> None:
@@ -105,7 +106,8 @@ class FramedTable:
 
         Where that line alone makes the frame, it may have belonged to the one before.
         """
-        what = f"{self.path}: the last line has no end, as if the file was cut off"
+        size = self.path.stat().st_size
+        what = f"{self.path}: byte {size}: the last line has no end, as if the file was cut off"
         last = list(self.spans.values())[-1:]
         with self.path.open("rb") as stream:
             stream.seek(last[0].start if last else 0)
@@ -149,14 +151,10 @@ class FramedTable:
         return spans
 
     def _number(self, word: bytes, line: int) -> float:
-        try:
-            value = float(self._decimal(word.decode("utf-8", errors="replace")))
-        except ValueError:
-            value = float("nan")
-        if not np.isfinite(value):
-            text = word.decode("utf-8", errors="replace").strip()
-            raise CorruptFile(f"{self.path}: line {line}: {self.key} is {text!r}, not a number")
-        return value
+        text = self._decimal(word.decode("utf-8", errors="replace"))
+        if fault := number_fault(text):
+            raise CorruptFile(f"{self.path}: line {line}: {self.key}: {fault}")
+        return float(text)
 
     def _decimal(self, text: str) -> str:
         return text.replace(",", ".") if self.layout.decimal_comma else text
@@ -170,10 +168,10 @@ class FramedTable:
         span = self.spans.get(key, Span(start=0, end=0, line=0))
         with self.path.open("rb") as stream:
             stream.seek(span.start)
-            text = stream.read(span.end - span.start).decode("utf-8", errors="replace")
+            text = plain_text(stream.read(span.end - span.start), self.path, span.line)
         names, columns = list(self.roles), list(self.roles.values())
         table = parse_table(
-            self._decimal(text).replace("\r", ""),
+            self._decimal(text),
             columns,
             columns=self.layout.width,
             delimiter=self.layout.delimiter,

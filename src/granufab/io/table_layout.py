@@ -47,7 +47,7 @@ def table_layout(path: Path) -> TableLayout:
         whole = not stream.read(1)
     layout = sniff_layout(head, whole=whole)
     if layout is None:
-        raise CorruptFile(f"{path}: this is no table of text with rows of numbers")
+        raise CorruptFile(f"{path}: line 1: here begins no table of text with rows of numbers")
     return layout
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile, UnknownFormat
 from granufab.io.checked_hdf5 import LARGEST_RATIO
+from granufab.io.text_rows import number_fault
 
 __all__ = ["TYPES", "VtkFile", "is_vtk_xml"]
 
@@ -77,8 +78,8 @@ class VtkFile:
     def count(self, piece: ElementTree.Element, name: str) -> int:
         """A count that a piece declares, 0 where it does not."""
         text = piece.get(name, "0")
-        if not text.isdigit():
-            raise self.corrupt(f"{name} is {text!r}, expected a whole number")
+        if not re.fullmatch(r"[0-9]{1,15}", text):
+            raise self.corrupt(f"array lengths: {name} is {text[:40]!r}, expected a whole number")
         return int(text)
 
     def array(self, element: ElementTree.Element, rows: int | None = None) -> NDArray:
@@ -93,17 +94,20 @@ class VtkFile:
         name = element.get("Name", "array")
         kind = TYPES.get(element.get("type", ""))
         width = element.get("NumberOfComponents", "1")
-        if kind is None or not width.isdigit() or not 1 <= int(width) <= 1000:
-            raise self.corrupt(f"{name} has type {element.get('type')!r} of {width} components")
+        if kind is None or not re.fullmatch(r"[1-9][0-9]{0,2}", width):
+            kind = element.get("type")
+            raise self.corrupt(f"array {name} has type {kind!r} of {width[:40]} components")
         values = self._decoded(element, np.dtype(self._order + kind), name)
         if len(values) % int(width) or rows not in (None, len(values) // int(width)):
-            raise self.corrupt(f"{name} has {len(values)} numbers, expected {rows} rows of {width}")
+            raise self.corrupt(
+                f"array {name} has {len(values)} numbers, expected {rows} rows of {width}"
+            )
         return values.reshape(-1, int(width)) if int(width) > 1 else values
 
     def _tail(self, data: bytes, start: int) -> bytes:
         end = data.rfind(b"</AppendedData>")
         if end < start:
-            raise self.corrupt("is truncated, its appended data do not end")
+            raise self.corrupt(f"byte {len(data)}: is truncated, its appended data do not end")
         return data[start:end]
 
     def _decoded(self, element: ElementTree.Element, dtype: np.dtype, name: str) -> NDArray:
@@ -122,7 +126,7 @@ class VtkFile:
                 data = self._blocks(_from_base64(coded), 0)
             return np.frombuffer(data, dtype)
         except (ValueError, IndexError, binascii.Error, zlib.error, lzma.LZMAError) as error:
-            raise self.corrupt(f"{name} cannot be decoded ({error})") from None
+            raise self.corrupt(f"array {name} cannot be decoded ({error})") from None
 
     def _ascii(self, text: str, dtype: np.dtype, name: str) -> NDArray:
         with warnings.catch_warnings():
@@ -130,7 +134,8 @@ class VtkFile:
             try:
                 return np.fromstring(text, np.float64 if dtype.kind == "f" else np.int64, sep=" ")
             except (DeprecationWarning, ValueError):
-                raise self.corrupt(f"{name} holds something that is no number") from None
+                fault = next(filter(None, map(number_fault, text.split())), "no numbers")
+                raise self.corrupt(f"array {name}: {fault}") from None
 
     def _coded(self, element: ElementTree.Element) -> bytes:
         """The base64 text of one array among the appended ones, up to the next."""

@@ -26,7 +26,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InvalidSettings(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InvalidSettings(f"{path}: cannot be read ({error})") from None
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # nested too deep, a number of 5000 digits
         raise InvalidSettings(f"{path}: not valid TOML: {error}") from None
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from granufab.errors import CorruptFile, MissingData
 from granufab.io.found import FoundCell
+from granufab.io.text_rows import number_fault
 from granufab.packing import Array
 
 __all__ = ["bounds_cell", "tilted_cell"]
@@ -87,7 +88,9 @@ def _numbers(lines: Sequence[Sequence[str]], columns: int, place: str) -> Array:
     try:
         return np.array([[float(word) for word in line[:columns]] for line in lines])
     except ValueError:
-        raise CorruptFile(f"{place}: BOX BOUNDS holds something that is not a number") from None
+        words = (word for line in lines for word in line[:columns])
+        fault = next(filter(None, map(number_fault, words)), "")
+        raise CorruptFile(f"{place}: BOX BOUNDS: {fault}") from None
 
 
 def _boundaries(

@@ -6,9 +6,9 @@ import numpy as np
 
 from granufab.errors import MissingData
 from granufab.io.found import FoundContacts
-from granufab.io.lammps.columns import CONTACT_WORDS, Columns, find_columns
+from granufab.io.lammps.columns import CONTACT_WORDS, Columns
 from granufab.io.lammps.dump_index import DumpFrame
-from granufab.io.lammps.grains import frame_columns, whole_numbers
+from granufab.io.lammps.grains import frame_columns, known_columns, whole_numbers
 from granufab.io.read_options import ReadOptions
 from granufab.packing import Array
 
@@ -20,8 +20,7 @@ _NORMAL, _POINT = ("nx", "ny", "nz"), ("cx", "cy", "cz")
 
 def contact_columns(frame: DumpFrame, options: ReadOptions) -> Columns:
     """Where a local dump's columns are, as far as names tell and the user says."""
-    given = options.columns.get("contacts", {})
-    return find_columns(frame.columns, CONTACT_WORDS, given, "contacts")
+    return known_columns(frame, CONTACT_WORDS, options, "contacts")
 
 
 def unnamed(frame: DumpFrame) -> MissingData:

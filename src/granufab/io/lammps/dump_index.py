@@ -104,7 +104,8 @@ def index_dump(path: Path) -> DumpIndex:
         last = frames.pop()
         cut = f"step {last.step} with {last.rows_found} of {last.count} rows"
     if not frames:
-        raise CorruptFile(f"{path}: no complete frame{f', only {cut}' if cut else ''}")
+        end = f"no complete frame up to the end at byte {path.stat().st_size}"
+        raise CorruptFile(f"{path}: {end}{f', only {cut}' if cut else ''}")
     return DumpIndex(frames=tuple(frames), cut=cut)
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from granufab.errors import CorruptFile, MissingData
+from granufab.errors import CorruptFile, InvalidSettings, MissingData
 from granufab.io.found import FoundCell, FoundContacts, FoundFrame
 from granufab.io.lammps.box import bounds_cell
 from granufab.io.lammps.columns import GRAIN_WORDS, Columns, find_columns
@@ -15,7 +15,7 @@ from granufab.io.number_rows import number_rows
 from granufab.io.read_options import ReadOptions
 from granufab.packing import Array, IntArray
 
-__all__ = ["frame_columns", "grain_columns", "parse_grains", "whole_numbers"]
+__all__ = ["frame_columns", "grain_columns", "known_columns", "parse_grains", "whole_numbers"]
 
 _POSITIONS = (("xu", "yu", "zu"), ("x", "y", "z"), ("xsu", "ysu", "zsu"), ("xs", "ys", "zs"))
 _WANTED = ("id", "radius", "diameter", "mass", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
@@ -27,7 +27,7 @@ def grain_columns(frame: DumpFrame, options: ReadOptions) -> Columns:
     Raises:
         MissingData: there are no positions.
     """
-    found = find_columns(frame.columns, GRAIN_WORDS, options.columns.get("grains", {}), "grains")
+    found = known_columns(frame, GRAIN_WORDS, options, "grains")
     if not any(found.has(*axes) for axes in _POSITIONS):
         raise MissingData(
             f"{frame.path}: line {frame.line - 1}: no positions among the columns "
@@ -35,6 +35,20 @@ def grain_columns(frame: DumpFrame, options: ReadOptions) -> Columns:
             '[grains] x = "…"'
         )
     return found
+
+
+def known_columns(
+    frame: DumpFrame, words: Mapping[str, tuple[str, ...]], options: ReadOptions, section: str
+) -> Columns:
+    """Where a frame's columns are, by their names and the user's words.
+
+    Raises:
+        InvalidSettings: the user's words do not fit the columns; names their line.
+    """
+    try:
+        return find_columns(frame.columns, words, options.columns.get(section, {}), section)
+    except InvalidSettings as error:
+        raise InvalidSettings(f"{frame.path}: line {frame.line - 1}: {error}") from None
 
 
 def parse_grains(

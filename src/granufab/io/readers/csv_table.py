@@ -83,7 +83,7 @@ def _check_map(columns: Mapping[str, Mapping[str, str | int]]) -> None:
                 f"columns: section [{section}] is unknown, allowed: {', '.join(_SECTIONS)}"
             )
     for name, value in columns.get("conventions", {}).items():
-        if value not in _CONVENTIONS.get(name, ()):
+        if isinstance(value, bool) or value not in _CONVENTIONS.get(name, ()):
             words = "; ".join(f"{key} = {a!r} or {b!r}" for key, (a, b) in _CONVENTIONS.items())
             raise InvalidSettings(f"columns: [conventions] {name} = {value!r}, allowed: {words}")
 
@@ -185,6 +185,7 @@ class _Sample:
         rows = self.contacts.rows(key)
         says: dict[str, Any] = dict(options.columns.get("conventions", {}))
         return FoundContacts(
+            place=rows.place,
             first=rows.whole("i"),
             second=rows.whole("j"),
             wall=rows["wall"] != 0 if "wall" in rows else None,
@@ -274,5 +275,9 @@ def _base(contacts: FoundContacts, position: Array, radius: Array | None) -> int
 
 
 FORMAT = ForeignFormat(
-    key="csv", name="tables of text (grains, contacts)", matches=_matches, open=_open
+    key="csv",
+    name="tables of text (grains, contacts)",
+    matches=_matches,
+    open=_open,
+    byte_order_mark=True,
 )

@@ -136,6 +136,7 @@ def _contacts(paths: Sequence[Path]) -> FoundContacts:
     part = np.where(wall[:, None], 0.0, table[:, 2:4])  # a driver has none
     number = integers(np.concatenate([table[:, :2], part]).ravel(), place, "body").reshape(2, -1, 2)
     return FoundContacts(
+        place=place,
         first=number[0][:, 0],
         second=number[0][:, 1],
         wall=wall,

@@ -14,10 +14,11 @@ from typing import BinaryIO
 
 import numpy as np
 
-from granufab.errors import CorruptFile, MissingData
+from granufab.errors import CorruptFile
 from granufab.io.foreign_format import ForeignFormat
 from granufab.io.found import FoundCell, FoundFrame, LazyFrames, Source
 from granufab.io.read_options import ReadOptions
+from granufab.io.text_rows import integers, plain_text
 from granufab.io.text_table import parse_table
 from granufab.packing import Array
 
@@ -119,10 +120,10 @@ def _columns(text: str, place: str) -> dict[str, list[int]]:
     words = text.split(":")
     columns: dict[str, list[int]] = {}
     place_now = 0
-    if len(words) % 3 or not all(width.isdigit() for width in words[2::3]):
+    if len(words) % 3 or not all(re.fullmatch(r"[0-9]{1,3}", width) for width in words[2::3]):
         raise CorruptFile(f"{place}: Properties={text!r} is no list of name:type:width")
     for name, width in zip(words[::3], words[2::3], strict=True):
-        columns[name] = list(range(place_now, place_now + min(int(width), 1000)))
+        columns[name] = list(range(place_now, place_now + int(width)))
         place_now += int(width)
     return columns
 
@@ -141,7 +142,7 @@ def _frame(path: Path, block: _Block) -> FoundFrame:
         raise CorruptFile(f"{place}: no property pos of three columns in {list(columns)}")
     with path.open("rb") as stream:
         stream.seek(block.start)
-        text = stream.read(block.end - block.start).decode("utf-8", "replace")
+        text = plain_text(stream.read(block.end - block.start), path, block.line)
     wanted = [column for group in use.values() for column in group]
     table = parse_table(text, wanted, place=str(path), first_line=block.line)
     if len(table) != block.rows:
@@ -156,7 +157,7 @@ def _frame(path: Path, block: _Block) -> FoundFrame:
         place=place,
         position=values["position"],
         radius=radius,
-        number=None if number is None else number.astype(np.int64),
+        number=None if number is None else integers(number, place, "id"),
         mass=_single(values["mass"]),
         velocity=values["velocity"] if values["velocity"].shape[1] == 3 else None,
         spin=values["spin"] if values["spin"].shape[1] == 3 else None,
@@ -215,12 +216,14 @@ def _open(paths: Sequence[Path], options: ReadOptions) -> Source:
             notes.append(f"{path}: read up to the last complete frame ({wrong})")
         frames += [(path, block) for block in blocks]
         if blocks:
-            header = dict(_PAIR.findall(next((b.comment for b in blocks if b.comment), "")))
-            names = _columns(header.get("Properties", "").strip("\"'") or "pos:R:3", str(path))
+            begun = next((b for b in blocks if b.comment), blocks[0])
+            header = dict(_PAIR.findall(begun.comment or ""))
+            place = f"{path}: line {begun.line - 1}"
+            names = _columns(header.get("Properties", "").strip("\"'") or "pos:R:3", place)
             known = {*_IGNORED, *(name for group in _NAMES.values() for name in group)}
             unknown |= dict.fromkeys(name for name in names if name not in known)
     if not frames:
-        raise MissingData(f"{paths[0]}: holds no frame")
+        raise CorruptFile(f"{paths[0]}: holds no frame in {paths[0].stat().st_size} bytes")
     return LazyFrames(
         count=len(frames),
         parse=lambda index: _frame(*frames[index]),

@@ -105,7 +105,11 @@ def _checked(path: Path, size: int, entries: NDArray, names: list[str]) -> _Inde
     chunks: dict[tuple[int, str], np.void] = {}
     frames = int(entries["frame"].max()) + 1 if len(entries) else 0
     if frames > len(entries) + 1:
-        raise CorruptFile(f"{path}: {len(entries)} chunks cannot make {frames} frames")
+        late = int(np.argmax(entries["frame"]))
+        raise CorruptFile(
+            f"{path}: item {late} of the index is of frame {frames - 1}, but {len(entries)} chunks "
+            "cannot make so many"
+        )
     whole = frames
     for entry in entries:
         frame, kind, name = int(entry["frame"]), int(entry["type"]), int(entry["name"])
@@ -118,7 +122,9 @@ def _checked(path: Path, size: int, entries: NDArray, names: list[str]) -> _Inde
             whole = min(whole, frame)
         chunks[frame, names[name]] = entry
     if whole == 0:
-        raise CorruptFile(f"{path}: is truncated, it has no complete frame")
+        raise CorruptFile(
+            f"{path}: is truncated or damaged, frame 0 is not complete in its {size} bytes"
+        )
     return _Index(path, whole, chunks, whole < frames)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from granufab.errors import CorruptFile
-from granufab.io.text_rows import LARGEST, checked_count
+from granufab.io.text_rows import LARGEST, checked_count, number_fault, plain_text
 
 __all__ = ["Lines", "numbers_after"]
 
@@ -45,7 +45,7 @@ class Lines:
         self.at += 1
         if not raw.endswith(b"\n"):
             raise CorruptFile(f"{self.place} does not end: the file is cut off")
-        return raw.decode("utf-8", errors="replace").split()
+        return plain_text(raw, self.path, self.at).split()
 
     def needed(self, what: str) -> list[str]:
         """Words of the next line, which must be there and hold something.
@@ -89,10 +89,6 @@ def numbers_after(words: Sequence[str], name: str, count: int, place: str) -> li
 
 
 def _number(word: str, place: str) -> float:
-    try:
-        value = float(word)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise CorruptFile(f"{place}: {word!r} is not a finite number")
-    return value
+    if fault := number_fault(word):
+        raise CorruptFile(f"{place}: {fault}")
+    return float(word)

@@ -20,6 +20,7 @@ from granufab.io.foreign_format import ForeignFormat
 from granufab.io.found import FoundCell, FoundFrame, LazyFrames, Source
 from granufab.io.lammps.box import bounds_cell, tilted_cell
 from granufab.io.read_options import ReadOptions
+from granufab.io.text_rows import whole_text
 from granufab.io.text_table import parse_table
 from granufab.packing import Array
 
@@ -44,18 +45,17 @@ def _matches(path: Path, head: bytes) -> bool:
 
 @dataclass(slots=True)
 class _File:
-    """Header lines by their words, and sections: hint, text and first line of each."""
+    """How many lines, header lines by their words, sections: hint, text, first line of each."""
 
     path: Path
+    lines: int
     header: dict[str, list[str]]
     sections: dict[str, tuple[str, str, int]]
 
 
 def _parse(path: Path) -> _File:
-    lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
-    if lines[-1]:
-        raise CorruptFile(f"{path}: line {len(lines)}: the file ends within a line")
-    parsed = _File(path, {}, {})
+    lines = whole_text(path).split("\n")
+    parsed = _File(path, len(lines) - 1, {}, {})
     starts = [k for k, line in enumerate(lines) if k and _SECTION.match(line.strip())]
     for line in lines[1 : starts[0] if starts else len(lines)]:
         words = line.partition("#")[0].split()
@@ -91,7 +91,7 @@ def _state(path: Path, options: ReadOptions) -> FoundFrame:
 
 def _count(parsed: _File) -> int:
     words = parsed.header.get("atoms", [])
-    if len(words) != 1 or not words[0].isdigit() or len(words[0]) > 15:
+    if len(words) != 1 or not words[0].isdecimal() or len(words[0]) > 15:
         raise CorruptFile(f"{parsed.path}: the header has no number of atoms")
     return int(words[0])
 
@@ -99,7 +99,7 @@ def _count(parsed: _File) -> int:
 def _style(parsed: _File) -> tuple[str, int]:
     """The atom style and its columns; without a hint it is taken to be sphere."""
     if "Atoms" not in parsed.sections:
-        raise CorruptFile(f"{parsed.path}: there is no section Atoms")
+        raise CorruptFile(f"{parsed.path}: there is no section Atoms up to line {parsed.lines}")
     hint = (parsed.sections["Atoms"][0].split() or ["sphere"])[0]
     if hint not in _STYLES:
         raise MissingData(

@@ -105,7 +105,9 @@ class Offsets:
         pair = np.column_stack([contacts.first, contacts.second])
         gap = np.linalg.norm(branch, axis=1) - self._radius[pair].sum(axis=1)
         if (side != 0).any() and np.median(np.abs(gap[side != 0])) > TOUCHES * self._radius.mean():
+            row = int(np.flatnonzero(side != 0)[0])
             raise CorruptFile(
-                f"{place}: contacts across the upper edge do not touch at any offset of its image "
+                f"{place}: contacts across the upper edge (the first is contact {row}) do not "
+                "touch at any offset of its image "
                 f"(median surface distance {np.median(np.abs(gap[side != 0])):.3g})"
             )

@@ -21,6 +21,7 @@ from granufab.io.plain_hdf5 import PlainHdf5, holds_groups, open_plain
 from granufab.io.read_options import ReadOptions
 from granufab.io.readers.lmgc90_records import Bodies, read_bodies
 from granufab.io.readers.lmgc90_text import NO_CELL, points_apart
+from granufab.io.text_rows import integers
 
 __all__ = ["FORMAT"]
 
@@ -65,10 +66,11 @@ class _Table:
 def _contacts(file: PlainHdf5, place: str, bodies: Bodies) -> FoundContacts:
     dimension = bodies.dimension
     table = _Table(file, place, "VlocRloc")
-    numbers = table.columns("idata", "ibdyty").astype(np.int64)
+    numbers = table.columns("idata", "ibdyty")
     kinds = table.columns("idata", "bdyty")
     if numbers.shape[1] != 2 or kinds.shape[1] != 2:
         raise file.corrupt(f"{place}: pairs have {numbers.shape[1]} columns, expected 2")
+    numbers = integers(numbers.ravel(), f"{file.path}: {place}", "body").reshape(-1, 2)
     normal, force = _forces(table, dimension)
     point = table.columns("rdata", "coor")
     return FoundContacts(

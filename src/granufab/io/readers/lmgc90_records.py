@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile
+from granufab.io.text_rows import plain_text
 from granufab.packing import Array, IntArray
 
 __all__ = ["Bodies", "Fields", "Table", "body_starts", "fortran", "read_bodies", "read_text"]
@@ -19,10 +20,10 @@ ROUND = ("DISKx", "SPHER")
 GRAINS = (*ROUND, "POLYG", "POLYR", "CYLND")
 """Contactors of grains; all others (JONCx, PLANx, xKSID, …) are walls."""
 
-_VALUE = r"[ \t]*(?:=[ \t]*)?([+-]?(?:\d+\.\d*|\.\d+)(?:[DdEe][+-]?\d+|[+-]\d+)?)(?![\w.*+-])"
+_VALUE = r"[ \t]*(?:=[ \t]*)?([+-]?(?:\d+\.\d*|\.\d+)(?:[DdEe][+-]?\d+|[+-]\d+)?)(?![\w.,*+#-])"
 _FIELD = re.compile(r"([A-Za-z]+\d?(?:\(\d\)|/H)?)" + _VALUE)
 _BARE_EXPONENT = re.compile(r"(?<=[\d.])([+-]\d+)$")
-_BODY = re.compile(r"\$bdyty[^\n]*\n[ \t]*RBDY([23])[ \t]+(\d+)")
+_BODY = re.compile(r"\$bdyty[^\n]*\n[ \t]*RBDY([23])[ \t]+(\d{1,15})(?!\d)")
 
 
 def fortran(word: str) -> float:
@@ -55,7 +56,9 @@ class Fields:
         values = [self._values.get(name, np.nan) for name in names]
         if not np.isfinite(values).all():
             wrong = names[int(np.argmin(np.isfinite(values)))]
-            raise CorruptFile(f"{self._place}: {wrong} is missing or no number")
+            raise CorruptFile(
+                f"{self._place}: {wrong} is missing or no number with a decimal point"
+            )
         return values
 
 
@@ -92,7 +95,9 @@ class Table:
         often = np.bincount(sound[sound >= 0], minlength=len(wanted))
         wrong = int(np.argmax(often != 1)) if len(wanted) else 0
         where = self._text[self._starts[wrong] :][:60].split(maxsplit=3)[:3] if len(wanted) else []
-        raise CorruptFile(f"{self._place}, {' '.join(where)}: {name} is missing or no number")
+        raise CorruptFile(
+            f"{self._place}, {' '.join(where)}: {name} is missing or no number with a decimal point"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -126,8 +131,9 @@ def read_text(path: Path, start: int = 0, end: int | None = None) -> str:
         stream.seek(start)
         data = stream.read(-1 if end is None else end - start)
     if not data.endswith(b"\n"):
-        raise CorruptFile(f"{path}: is truncated, its last line is not complete")
-    return data.decode("utf-8", "replace")
+        last = start + len(data)
+        raise CorruptFile(f"{path}: is truncated at byte {last}, its last line is not complete")
+    return plain_text(data, path)
 
 
 def _bodies_in(text: str, path: Path) -> Iterator[tuple[int, int, str]]:
@@ -174,7 +180,7 @@ def read_bodies(path: Path) -> Bodies:
     if len(dimensions) != 1 or not text.rstrip().endswith(("$$$$$$", "--")):
         raise CorruptFile(
             f"{path}: expected complete bodies RBDY2 or RBDY3, got {len(numbers)} in "
-            f"{sorted(dimensions)} dimensions"
+            f"{sorted(dimensions)} dimensions up to line {text.count(chr(10))}"
         )
     if len(set(numbers)) != len(numbers):
         raise CorruptFile(f"{path}: a body is described twice")

@@ -27,15 +27,16 @@ from granufab.io.readers.lmgc90_records import (
     read_bodies,
     read_text,
 )
+from granufab.io.text_rows import number_fault
 from granufab.packing import Array, IntArray
 
 __all__ = ["FORMAT", "NO_CELL", "points_apart"]
 
 NO_CELL = "the cell is not in LMGC90's files; give --cell (and --periodic) where there is one"
-_STEP = re.compile(rb"\$steps\s+(\d+)\s+time=\s*(\S+)")
+_STEP = re.compile(rb"\$steps\s+(\d{1,18})\s+time=\s*(\S+)")
 _PAIR = re.compile(
-    r"\$icdan[ \t]+(\w{5})[ \t]+(\d+)[^\n]*\n[^\n]*\n[ \t]*(\w{5})[ \t]+(\d+)"
-    r"(?:[ \t]+\w{5}[ \t]+\d+)+?[ \t]+\S+[ \t]+(\w{5})[ \t]+(\d+)[ \t]+\w{5}[ \t]"
+    r"\$icdan[ \t]+(\w{5})[ \t]+(\d{1,15})\b[^\n]*\n[^\n]*\n[ \t]*(\w{5})[ \t]+(\d{1,15})"
+    r"(?:[ \t]+\w{5}[ \t]+\d+)+?[ \t]+\S+[ \t]+(\w{5})[ \t]+(\d{1,15})[ \t]+\w{5}[ \t]"
 )
 
 
@@ -74,16 +75,15 @@ def _states(path: Path) -> list[_State]:
         found = [(one.start(), int(one[1]), one[2]) for one in _STEP.finditer(text)]
         size = len(text)
     if not found:
-        raise CorruptFile(f"{path}: no line '$steps … time= …' can be read")
+        raise CorruptFile(f"{path}: no line '$steps … time= …' can be read in {size} bytes")
     ends = [start for start, _, _ in found[1:]] + [size]
-    try:
-        times = [float(time.replace(b"D", b"E")) for _, _, time in found]
-    except ValueError:
-        raise CorruptFile(f"{path}: a time in a line '$steps … time= …' is no number") from None
-    return [
-        _State(path, step, time, start, end)
-        for (start, step, _), time, end in zip(found, times, ends, strict=True)
-    ]
+    states = []
+    for (start, step, word), end in zip(found, ends, strict=True):
+        text = word.decode("utf-8", "replace").replace("D", "E")
+        if fault := number_fault(text):
+            raise CorruptFile(f"{path}: step {step}: time: {fault}")
+        states.append(_State(path, step, float(text), start, end))
+    return states
 
 
 def _moved(bodies: Bodies, state: _State) -> tuple[Array, Array, Array]:
@@ -123,6 +123,7 @@ def _contacts(state: _State, bodies: Bodies) -> FoundContacts:
     pairs = np.array([(int(one[4]), int(one[6])) for one in records], np.int64).reshape(-1, 2)
     rigid = [one[3].startswith("RBDY") and one[5].startswith("RBDY") for one in records]
     return FoundContacts(
+        place=place,
         first=pairs[:, 0],
         second=pairs[:, 1],
         wall=~np.array(rigid, bool),
@@ -197,7 +198,7 @@ def _listed(paths: Sequence[Path]) -> dict[str, list[Path]]:
         if kind in kinds:
             kinds[kind].append(path)
         elif kind is None and path in paths:
-            raise CorruptFile(f"{path}: is no BODIES, DOF or Vloc_Rloc file of LMGC90")
+            raise CorruptFile(f"{path}: line 1 begins no BODIES, DOF or Vloc_Rloc file of LMGC90")
     return kinds
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from granufab.errors import CorruptFile
-from granufab.io.text_rows import checked_count
+from granufab.io.text_rows import checked_count, number_fault, plain_text
 
 __all__ = ["Block", "data_blocks", "fstat_blocks"]
 
@@ -34,7 +34,7 @@ class Block:
         """The rows."""
         with self.path.open("rb") as stream:
             stream.seek(self.start)
-            return stream.read(self.stop - self.start).decode("utf-8", errors="replace")
+            return plain_text(stream.read(self.stop - self.start), self.path, self.line + 1)
 
 
 def data_blocks(path: Path) -> tuple[list[Block], bool]:
@@ -51,7 +51,7 @@ def data_blocks(path: Path) -> tuple[list[Block], bool]:
                 continue
             if not raw.endswith(b"\n"):
                 return blocks, False
-            words = raw.decode("utf-8", errors="replace").split()
+            words = plain_text(raw, path, line).split()
             place = f"{path}: line {line}"
             if len(words) not in (6, 8) or (blocks and len(words) != len(blocks[0].header)):
                 wanted = len(blocks[0].header) if blocks else "6 (2D) or 8 (3D)"
@@ -77,7 +77,7 @@ def data_blocks(path: Path) -> tuple[list[Block], bool]:
 
 def _rows(word: str, size: int, place: str) -> int | None:
     """Rows that a frame announces; None where the file ends long before."""
-    if word.isdigit() and 2 * int(word[:15]) > size:
+    if word.isdecimal() and 2 * int(word[:15]) > size:
         return None
     return checked_count(word, size, place, "grains")
 
@@ -102,7 +102,7 @@ def fstat_blocks(path: Path) -> tuple[list[Block], bool]:
                 if heads in (0, 3):
                     if header:
                         blocks.append(_fstat_block(path, header, head_line, start, at))
-                    header, heads = tuple(raw.decode("utf-8", errors="replace").split()), 0
+                    header, heads = tuple(plain_text(raw, path, line).split()), 0
                 heads += 1
                 start, head_line = at + len(raw), line
             elif heads != 3 and raw.strip():
@@ -122,10 +122,6 @@ def _fstat_block(path: Path, header: tuple[str, ...], line: int, start: int, sto
 
 
 def _number(word: str, place: str) -> float:
-    try:
-        value = float(word)
-    except ValueError:
-        value = float("nan")
-    if value - value != 0.0:
-        raise CorruptFile(f"{place}: {word!r} is not a finite number")
-    return value
+    if fault := number_fault(word):
+        raise CorruptFile(f"{place}: {fault}")
+    return float(word)

@@ -44,12 +44,12 @@ def _is_fstat(head: bytes) -> bool:
 def _is_data(head: bytes) -> bool:
     """Headers of 6 or 8 words, with as many rows of 8 or 14 after each as it announces."""
     lines = first_words(head)
-    if not lines or len(lines[0]) not in (6, 8) or not lines[0][0].isdigit():
+    if not lines or len(lines[0]) not in (6, 8) or not lines[0][0].isdecimal():
         return False
     wide = _ROW[2] if len(lines[0]) == 6 else _ROW[3]
     at, seen = 0, False
     while at < len(lines):
-        if len(lines[at]) != len(lines[0]) or not lines[at][0].isdigit():
+        if len(lines[at]) != len(lines[0]) or not lines[at][0].isdecimal():
             return False
         count = int(lines[at][0])
         rows = lines[at + 1 : at + 1 + count]
@@ -109,6 +109,7 @@ def _contacts(block: Block, bodies: int) -> FoundContacts:
                 f"are {bodies} grains (0..{bodies - 1})"
             )
     return FoundContacts(
+        place=place,
         first=first,
         second=second,
         wall=second < 0,
@@ -150,6 +151,7 @@ def _open(paths: Sequence[Path], options: ReadOptions) -> Source:
     data: list[Block] = []
     fstat: list[Block] = []
     notes: list[str] = []
+    without: list[Path] = []
     grains = 0
     for path in paths:
         if first_bytes(path).lstrip().startswith(b"#"):
@@ -159,12 +161,14 @@ def _open(paths: Sequence[Path], options: ReadOptions) -> Source:
             blocks, whole = data_blocks(path)
             data += blocks
             grains += 1
+        without += [] if blocks else [path]
         if not whole:
             notes.append(f"{path}: the last frame is cut off and left out")
     if not grains:
         raise MissingData(f"{paths[0]}: holds contacts only; give the .data file with the grains")
-    if not data or (len(paths) > grains and not fstat):
-        raise CorruptFile(f"{paths[0]}: cut off: no frame is complete")
+    if without:
+        end = f"up to the end at byte {without[0].stat().st_size}"
+        raise CorruptFile(f"{without[0]}: no frame is complete {end}: it is cut off")
     pairs: list[tuple[Block, Block | None]] = [(block, None) for block in data]
     if fstat:
         pairs = _same_times(data, fstat)

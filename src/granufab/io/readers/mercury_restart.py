@@ -74,12 +74,15 @@ def _parse(path: Path) -> _Restart:
             found.listed = True
             for _ in range(lines.count(words[1], "interactions")):
                 _add_interaction(found, lines.needed("interactions"), lines)
+        elif seen and {"particleIds", "particleWallIds", "BaseParticle"} & set(words):
+            raise CorruptFile(f"{lines.place} is a row more than the list before it announces")
         elif not seen:
             for name, value in pairwise(words):
                 if name.lower() in _HEADER:
                     found.words.setdefault(name.lower(), value)
     if not seen:
-        raise CorruptFile(f"{path}: has no line 'Particles N': it is cut off")
+        end = f"up to line {lines.at}"
+        raise CorruptFile(f"{path}: has no line 'Particles N' {end}: it is cut off")
     return found
 
 
@@ -132,7 +135,8 @@ def _frame(path: Path, found: _Restart, turns: int, options: ReadOptions) -> Fou
 def _dimension(found: _Restart, path: Path) -> int:
     value = _header(found, ("systemdimensions", "dim"), path)
     if value not in (2.0, 3.0):
-        raise CorruptFile(f"{path}: has {value} dimensions, expected 2 or 3")
+        what = "missing" if value is None else f"{value:g}"
+        raise CorruptFile(f"{path}: the header's systemDimensions is {what}, expected 2 or 3")
     return int(value)
 
 
@@ -144,7 +148,9 @@ def _header(found: _Restart, names: Sequence[str], path: Path) -> float | None:
             except ValueError:
                 value = float("nan")
             if not np.isfinite(value):
-                raise CorruptFile(f"{path}: {name} is {found.words[name]!r}, expected a number")
+                raise CorruptFile(
+                    f"{path}: the header's {name} is {found.words[name]!r}, expected a number"
+                )
             return value
     return None
 

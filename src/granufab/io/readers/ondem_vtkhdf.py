@@ -17,6 +17,7 @@ from granufab.io.foreign_format import ForeignFormat
 from granufab.io.found import FoundCell, FoundContacts, FoundFrame, LazyFrames, Source
 from granufab.io.plain_hdf5 import PlainHdf5, holds_groups, open_plain
 from granufab.io.read_options import ReadOptions
+from granufab.io.text_rows import integers
 from granufab.packing import Array, IntArray
 
 __all__ = ["CELL", "FORMAT", "PAIRS", "POINTS"]
@@ -44,6 +45,11 @@ def _numbers(file: PlainHdf5, name: str, count: int) -> Array | None:
     return values if np.isfinite(values).all() else None
 
 
+def _whole(file: PlainHdf5, name: str, count: int | None = None) -> IntArray:
+    """A dataset of whole numbers."""
+    return integers(file.array(name, rows=count).ravel(), f"{file.path}: {name}", "the number")
+
+
 def _compression(file: PlainHdf5, force: Array, overlap: Array | None) -> Literal[1, -1]:
     """The sign of ``normal_force`` in a squeezed contact."""
     said = file.attributes(f"{PAIRS}/normal_force").get("positive_in")
@@ -59,14 +65,14 @@ def _others(file: PlainHdf5, spheres: IntArray) -> IntArray:
     for group in file.children("ONDEM/Bodies"):
         name = f"ONDEM/Bodies/{group}/body_id"
         if file.has(name):
-            known.append(file.array(name).ravel().astype(np.int64))
+            known.append(_whole(file, name))
     return np.setdiff1d(np.concatenate(known), spheres)
 
 
 def _contacts(file: PlainHdf5, spheres: IntArray) -> FoundContacts:
-    first = file.array(f"{PAIRS}/id1").ravel().astype(np.int64)
+    first = _whole(file, f"{PAIRS}/id1")
     count = len(first)
-    second = file.array(f"{PAIRS}/id2", rows=count).ravel().astype(np.int64)
+    second = _whole(file, f"{PAIRS}/id2", count)
     virtual = _numbers(file, f"{PAIRS}/virtual", count)
     keep = np.ones(count, bool) if virtual is None else virtual.reshape(count) == 0
     values = {
@@ -115,7 +121,7 @@ def _frame(path: Path) -> FoundFrame:
             raise file.corrupt(f"VTKHDF/Points has shape {position.shape}, expected (count, 3)")
         number = np.arange(count, dtype=np.int64)
         if file.has(f"{POINTS}/body_id"):
-            number = file.array(f"{POINTS}/body_id", rows=count).ravel().astype(np.int64)
+            number = _whole(file, f"{POINTS}/body_id", count)
         if len(np.unique(number)) != count:
             raise file.corrupt(f"{POINTS}/body_id: a number is given twice")
         values = {

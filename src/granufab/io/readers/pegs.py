@@ -58,7 +58,9 @@ def _read(path: Path) -> tuple[Array, int]:
     text = whole_text(path)
     columns = text.split("\n", 1)[0].count(",") + 1
     if columns not in (5, 6):
-        raise CorruptFile(f"{path}: line 1 has {columns} columns, expected 5 or 6")
+        raise CorruptFile(
+            f"{path}: line 1 has {columns} columns, expected 5 or 6 (numbers with a decimal point)"
+        )
     place = str(path)
     return parse_table(text, range(columns), columns=columns, place=place, delimiter=","), columns
 
@@ -109,6 +111,7 @@ def _contacts(listed: _Rows, number: int, known: Array, place: str) -> FoundCont
             f"line {line} of {listed.path.name}"
         )
     return FoundContacts(
+        place=here,
         first=pair[:, 0],
         second=pair[:, 1],
         normal_force=table[:, 3],

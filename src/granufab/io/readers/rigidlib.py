@@ -23,7 +23,7 @@ from granufab.io.foreign_format import ForeignFormat
 from granufab.io.found import FoundCell, FoundContacts, FoundFrame, LazyFrames, Source
 from granufab.io.read_options import ReadOptions
 from granufab.io.readers.lees_edwards import Offsets
-from granufab.io.text_rows import integers, whole_text
+from granufab.io.text_rows import integers, number_fault, whole_text
 from granufab.io.text_table import parse_table
 from granufab.packing import Array
 
@@ -68,20 +68,16 @@ def _parameters(path: Path | None) -> dict[str, str]:
     if path is None:
         return {}
     column = _PARAMETERS[path.name]
-    rows = [line.split() for line in whole_text(path).splitlines()]
+    rows = (line.split() for line in whole_text(path).split("\n"))
     return {row[0]: row[column] for row in rows if len(row) > column}
 
 
 def _value(given: dict[str, str], name: str, path: Path | None) -> float | None:
     if name not in given:
         return None
-    try:
-        value = float(given[name])
-    except ValueError:
-        value = float("nan")
-    if not np.isfinite(value):
-        raise CorruptFile(f"{path}: {name} is {given[name]!r}, expected a number")
-    return value
+    if fault := number_fault(given[name]):
+        raise CorruptFile(f"{path}: the value of {name}: {fault}")
+    return float(given[name])
 
 
 def _table(path: Path, columns: int) -> Array:
@@ -105,7 +101,7 @@ class _Simulation:
         table = _table(path, 7)
         if len(table) != len(self.radius):
             raise CorruptFile(
-                f"{path}: has {len(table)} grains, expected the {len(self.radius)} of posinit.dat"
+                f"{path}: ends with row {len(table)}, but posinit.dat has {len(self.radius)} grains"
             )
         contacts = self._contacts(snapshot, table)
         tilt = 0.0
@@ -133,8 +129,8 @@ class _Simulation:
         pair = integers(table[:, :2].ravel(), str(path), "grain").reshape(-1, 2)
         if grains[:, 6].sum() != 2 * len(table):
             raise CorruptFile(
-                f"{path}: has {len(table)} contacts, but the grains of "
-                f"{self.files.position[snapshot].name} count {grains[:, 6].sum() / 2:g}"
+                f"{path}: ends with row {len(table)}, but the grains of "
+                f"{self.files.position[snapshot].name} count {grains[:, 6].sum() / 2:g} contacts"
             )
         wrong = (pair < 0) | (pair >= len(grains))
         if wrong.any():
@@ -144,6 +140,7 @@ class _Simulation:
                 f"are {len(grains)} (0..{len(grains) - 1})"
             )
         return FoundContacts(
+            place=str(path),
             first=pair[:, 0],
             second=pair[:, 1],
             normal=table[:, 2:4],
@@ -166,7 +163,10 @@ def _edges(given: dict[str, str], path: Path | None, options: ReadOptions, place
             f"{place}: no Parameters_final.dat, so the box is unknown; give --cell LX,LY"
         )
     if not (edges > 0).all():
-        raise CorruptFile(f"{path or place}: the box has edges {edges.tolist()}, must be > 0")
+        raise CorruptFile(
+            f"{path or place}: column 2 of boxVec1x, boxVec2y: the box has edges "
+            f"{edges.tolist()}, must be > 0"
+        )
     return edges
 
 

@@ -24,7 +24,7 @@ from granufab.io.found import FoundCell, FoundContacts, FoundFrame, LazyFrames, 
 from granufab.io.read_options import ReadOptions
 from granufab.io.readers.keyword_lines import Lines
 from granufab.io.readers.rockable_shapes import Shape, read_shapes
-from granufab.io.text_rows import first_bytes, in_order
+from granufab.io.text_rows import first_bytes, in_order, number_fault
 from granufab.packing import Array
 
 __all__ = ["FORMAT"]
@@ -32,6 +32,8 @@ __all__ = ["FORMAT"]
 _KINDS = ((0, 0), (0, 1), (0, 2), (1, 1))
 """Vertex (0), edge (1) or face (2) of i and of j, by the type of the interaction."""
 _PART = 1 << 40
+_WORDS = ("t", "nDriven", "usePeriodicCell", "h")
+"""Keywords whose values are used."""
 
 
 def _is_conf(head: bytes) -> bool:
@@ -74,7 +76,9 @@ def _parse(path: Path) -> _Conf:
         elif words[0] == "density" and len(words) == 3:
             group = lines.integer(lines.number(words[1]), "group")
             conf.density[group] = lines.number(words[2])
-        elif not conf.body:
+        elif conf.body and len(words) == 23 and (words[0].isdecimal() or words[0] in conf.shape):
+            raise CorruptFile(f"{lines.place} is a row more than the list before it announces")
+        elif not conf.body and words[0] in _WORDS:
             conf.words[words[0]] = words[1:]
     if not conf.body or not conf.listed:
         lacks = "Interactions" if conf.body else "Particles"
@@ -103,6 +107,10 @@ def _frame(path: Path, shapes_file: Path) -> FoundFrame:
     of_body = [shapes[name] for name in conf.shape]
     body = np.array(conf.body).reshape(-1, 22)
     driven = int(_number(conf, "nDriven", path, 0.0))
+    if driven > len(body):
+        raise CorruptFile(
+            f"{path}: the header's nDriven is {driven}, but there are {len(body)} bodies"
+        )
     wall = np.arange(len(body)) < driven
     return FoundFrame(
         place=str(path),
@@ -122,13 +130,14 @@ def _frame(path: Path, shapes_file: Path) -> FoundFrame:
 
 def _number(conf: _Conf, name: str, path: Path, default: float) -> float:
     words = conf.words.get(name)
-    try:
-        value = default if words is None else float(words[0])
-    except ValueError:
-        value = float("nan")
-    if not np.isfinite(value) or abs(value) > 1e15:
-        raise CorruptFile(f"{path}: {name} is {(words or [''])[0]!r}, expected a number")
-    return value
+    if words is None:
+        return default
+    fault = number_fault(words[0])
+    if not fault and abs(float(words[0])) > 1e15:
+        fault = f"{words[0][:40]} is too large"
+    if fault:
+        raise CorruptFile(f"{path}: the header's {name}: {fault}")
+    return float(words[0])
 
 
 def _mass(conf: _Conf, body: Array, shapes: Sequence[Shape]) -> Array | None:

@@ -16,6 +16,7 @@ from granufab.errors import CorruptFile, MissingData
 from granufab.io.foreign_format import ForeignFormat
 from granufab.io.found import FoundCell, FoundContacts, FoundFrame, LazyFrames, Source
 from granufab.io.read_options import ReadOptions
+from granufab.io.text_rows import first_bytes, integers
 from granufab.io.text_table import number_table
 from granufab.packing import Array
 
@@ -44,7 +45,7 @@ def _sample(spheres: Path, contacts: Path | None) -> FoundFrame:
         place=str(spheres),
         position=table[:, 1:4],
         radius=table[:, 4],
-        number=table[:, 0].astype(np.int64),
+        number=integers(table[:, 0], str(spheres), "id"),
         dimension=3,
         cell=_box(spheres),
         contacts=None if contacts is None else _contacts(contacts),
@@ -69,8 +70,8 @@ def _contacts(path: Path) -> FoundContacts:
     table = number_table(path, range(6), columns=10)
     return FoundContacts(
         place=str(path),
-        first=table[:, 0].astype(np.int64),
-        second=table[:, 1].astype(np.int64),
+        first=integers(table[:, 0], str(path), "idA"),
+        second=integers(table[:, 1], str(path), "idB"),
         normal=table[:, 2:5],
         normal_force=table[:, 5],
         compression=-1,
@@ -78,12 +79,18 @@ def _contacts(path: Path) -> FoundContacts:
 
 
 def _open(paths: Sequence[Path], options: ReadOptions) -> Source:
-    heads = {path: path.open("rb").read(4096) for path in paths}
+    heads = {path: first_bytes(path) for path in paths}
     spheres = [path for path, head in heads.items() if _is_spheres(head)]
     contacts = [path for path, head in heads.items() if _is_contacts(head)]
+    for path in paths:
+        if path not in (*spheres, *contacts):
+            raise CorruptFile(
+                f"{path}: line 1 begins neither rows 'id Sphere x y z r' nor contacts with the "
+                "header 'idA idB nx ny nz Fn …'"
+            )
     if len(spheres) != 1 or len(contacts) > 1:
         raise MissingData(
-            f"{paths[0]}: a spam sample is one file of spheres and at most one of contacts, got "
+            f"{paths[0]}: give one file of spheres and at most one of contacts, got "
             f"{len(spheres)} and {len(contacts)}"
         )
     listed = contacts[0] if contacts else None

@@ -24,6 +24,7 @@ from granufab.io.foreign_format import ForeignFormat
 from granufab.io.found import FoundCell, FoundContacts, FoundFrame, LazyFrames, Source
 from granufab.io.line_contacts import line_contacts
 from granufab.io.read_options import ReadOptions
+from granufab.io.text_rows import integers
 from granufab.io.vtk_arrays import VtkFile, is_vtk_xml
 from granufab.packing import Array, IntArray
 
@@ -63,7 +64,7 @@ def _pieces(file: VtkFile, tag: str, counts: Sequence[str]) -> Columns:
 def _points(file: VtkFile) -> Array:
     columns = list(_pieces(file, "Points", ("NumberOfPoints",)).values())
     if not columns or columns[0].ndim != 2 or columns[0].shape[1] != 3:
-        raise file.corrupt("has no points of three coordinates")
+        raise file.corrupt("array Points is missing, or has no three coordinates")
     return columns[0].astype(float)
 
 
@@ -139,7 +140,7 @@ def _grains(path: Path, contacts: Path | None) -> FoundFrame:
         place=str(path),
         position=position,
         radius=radius,
-        number=None if number is None else number.astype(np.int64),
+        number=None if number is None else integers(number, str(path), "id"),
         mass=_first(columns, ("mass",), 1, count),
         velocity=velocity,
         spin=spin,
@@ -155,7 +156,7 @@ def _contacts(
 ) -> FoundContacts:
     file = VtkFile(path)
     columns = _cells(file)
-    pair = _pair(columns)
+    pair = _pair(columns, path)
     if {"id1", "id2"} <= set(columns) and "normal" not in columns:
         points, lines = _lines(file)
         if len(lines) == len(columns["id1"]):
@@ -166,17 +167,18 @@ def _contacts(
             )
     if pair is None:
         points = _pieces(file, "PointData", ("NumberOfPoints",))
-        pair = _pair(points)
+        pair = _pair(points, path)
         columns = columns if pair is None else points
     if pair is None:
         pair = _ends(file, position, radius)
         if number is not None:
-            pair = number.astype(np.int64)[pair]
+            pair = integers(number, str(path), "id")[pair]
     count = len(pair)
     gap, overlap = (_first(columns, (name,), 1, count) for name in ("gap", "overlap"))
     if gap is None and overlap is not None:
         gap = -overlap
     return FoundContacts(
+        place=str(path),
         first=pair[:, 0],
         second=pair[:, 1],
         normal=_first(columns, ("normal", "n"), 3, count),
@@ -187,12 +189,12 @@ def _contacts(
     )
 
 
-def _pair(columns: Columns) -> IntArray | None:
+def _pair(columns: Columns, path: Path) -> IntArray | None:
     for one, two in PAIR:
         if one in columns and two in columns:
             both = [columns[one], columns[two]]
             if all(column.ndim == 1 for column in both):
-                return np.stack(both, axis=1).astype(np.int64)
+                return np.stack([integers(ids, str(path), one) for ids in both], axis=1)
     return None
 
 
@@ -233,8 +235,8 @@ def _line_ends(file: VtkFile, piece: Element) -> IntArray:
         count = file.count(piece, rows)
         parts = {one.get("Name"): one for one in piece.findall(f"{tag}/DataArray")}
         if count and {"connectivity", "offsets"} <= set(parts):
-            ends = file.array(parts["offsets"], count).astype(np.int64)
-            joined = file.array(parts["connectivity"]).astype(np.int64)
+            ends = integers(file.array(parts["offsets"], count), str(file.path), "offset")
+            joined = integers(file.array(parts["connectivity"]), str(file.path), "point")
             if not (np.diff(ends, prepend=0) == 2).all() or ends[-1] != len(joined):
                 raise file.corrupt("its cells do not have two points each")
             return joined.reshape(-1, 2)
