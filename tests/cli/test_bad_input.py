@@ -111,7 +111,7 @@ def test_a_run_is_not_overwritten_without_force(granufab, case_file, tmp_path: P
         (["rnu"], ("rnu", "'run'")),
         (["new"], ("argument", "simple-shear")),
         (["new", "twist"], ("twist", "shear")),
-        (["run"], ("argument", "toml")),
+        (["run"], ("CASE.toml", "--start FILE")),
         (["measure"], ("argument", "FILE")),
         (["reproduce", "fig9"], ("fig9", "fig7")),
         (["reproduce", "fig7", "--seeds", "none"], ("--seeds", "integer")),

@@ -38,7 +38,8 @@ def _check_places(found: FoundFrame) -> None:
     grain = np.ones(len(position), bool) if found.wall is None else ~found.wall
     order = np.flatnonzero(grain)[np.argsort(position[grain, 0], kind="stable")]
     level = np.diff(position[order, 0]) == 0
-    near = order[np.r_[level, False] | np.r_[False, level]]  # the others differ in x already
+    first = np.flatnonzero(level)
+    near = order[np.union1d(first, first + 1)]  # the others differ in x already
     columns = [position[near]]
     if found.radius is not None:
         columns.append(np.asarray(found.radius, float)[near, None])

@@ -77,7 +77,10 @@ def _frame(path: Path, contacts: Sequence[Path], options: ReadOptions) -> FoundF
 def _listed(path: Path, grains: FoundFrame) -> FoundContacts:
     found = read_legacy_vtk(path)
     if len(found.position) and not (len(found.lines) and found.cells):
-        raise CorruptFile(f"{path}: has points without lines and their values; is it cut?")
+        raise CorruptFile(
+            f"{path}: has {len(found.position)} points without lines and their values up to its "
+            f"end, {path.stat().st_size} bytes; is it cut?"
+        )
     return line_contacts(
         str(path), found.position, found.lines, found.cells,
         position=grains.position, radius=grains.radius, number=grains.number,
