@@ -78,7 +78,9 @@ def _settings(
     from granufab.simulate.settings import load_case
 
     if file is None and not start:
-        raise InvalidSettings("give CASE.toml (granufab new shear > CASE.toml), or --start FILE")
+        raise InvalidSettings(
+            "give CASE.toml (granufab new shear > CASE.toml), or --start FILE; granufab run --help"
+        )
     given: dict[str, Any] = {}
     if file is None:
         given["name"] = start[0].stem
