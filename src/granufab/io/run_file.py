@@ -97,6 +97,11 @@ class RunFileWriter:
         """Frames written so far."""
         return self._frames
 
+    @property
+    def row_count(self) -> int:
+        """Rows of the series written so far."""
+        return self._rows
+
     def __enter__(self) -> Self:
         return self
 
