@@ -6,6 +6,7 @@ __all__ = [
     "BrokenState",
     "CorruptFile",
     "GranufabError",
+    "IncompleteFile",
     "InvalidPacking",
     "InvalidProblem",
     "InvalidSettings",
@@ -45,6 +46,10 @@ class CorruptFile(GranufabError, OSError):
 
 class BrokenState(GranufabError, RuntimeError):
     """A step of a simulation left a state that cannot be, or grains that overlap too far."""
+
+
+class IncompleteFile(UserWarning):
+    """A file is truncated, but what is there of it is sound; shown as a warning."""
 
 
 class NotConverged(GranufabError, RuntimeError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping
 from functools import partial
@@ -50,6 +51,18 @@ def run(
     force: Annotated[
         bool, typer.Option("--force", help="Replace the results of an earlier run.")
     ] = False,
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Go on from the last checkpoint, or start where none is."),
+    ] = False,
+    elsewhere: Annotated[
+        bool,
+        typer.Option("--elsewhere", help="Resume also where another processor or version ran."),
+    ] = False,
+    max_walltime: Annotated[
+        str | None,
+        typer.Option(metavar="TIME", help="End with a checkpoint after s, m:s, h:m:s or d-h:m:s."),
+    ] = None,
 ) -> None:
     """Simulate a case; writes run.h5, settings.toml, series.csv and summary.json."""
     from granufab.cli.output import print_pairs
@@ -60,7 +73,15 @@ def run(
     settings = _settings(case, start or [], foreign, overrides)
     folder = out or _default_folder(case, start or [])
     with show_progress(gentle=True) as progress:
-        result = run_into_folder(settings, folder, force=force, progress=progress)
+        result = run_into_folder(
+            settings,
+            folder,
+            force=force,
+            resume=resume,
+            elsewhere=elsewhere,
+            max_walltime=_seconds(max_walltime),
+            progress=progress,
+        )
     for line in result.summary.get("start", {}).get("notes", ()):
         print(f"granufab: start: {line}", file=sys.stderr)
     pairs = [*_fabric_pairs(settings, result), *solver_pairs(result.summary)]
@@ -68,7 +89,25 @@ def run(
     for warning in result.summary.get("warnings", ()):
         print(f"warning: {warning}")
     if result.summary.get("interrupted"):
+        if "stopped_by" in result.summary:
+            print("granufab: --max-walltime is over; go on with --resume", file=sys.stderr)
         raise KeyboardInterrupt
+
+
+def _seconds(text: str | None) -> float:
+    """Seconds of a time as job schedulers write it: s, m:s, h:m:s, d-h:m:s."""
+    if text is None:
+        return math.inf
+    days, dash, rest = text.rpartition("-")
+    try:
+        parts = [float(part) for part in rest.split(":")]
+        seconds = sum(part * 60.0**k for k, part in enumerate(reversed(parts)))
+        seconds += 86400.0 * float(days) if dash else 0.0
+    except ValueError:
+        seconds, parts = math.nan, []
+    if not (0 < seconds < math.inf) or len(parts) > 3:
+        raise InvalidSettings(f"--max-walltime {text!r}: give s, m:s, h:m:s or d-h:m:s, above 0")
+    return seconds
 
 
 def _settings(

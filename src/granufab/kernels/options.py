@@ -19,10 +19,27 @@ from numba.core import config
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
-__all__ = ["ARITHMETIC", "cache_folder", "inlined", "intrinsic", "kernel", "part", "steady"]
+__all__ = [
+    "ARITHMETIC",
+    "cache_folder",
+    "inlined",
+    "intrinsic",
+    "kernel",
+    "kernels_hash",
+    "part",
+    "steady",
+]
 
 F = TypeVar("F", bound=Callable[..., Any])
 ARITHMETIC: dict[str, Any] = {"fastmath": {"contract", "nsz", "nnan"}, "error_model": "numpy"}
+
+
+def kernels_hash() -> str:
+    """Hash of the kernels' text."""
+    text = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        text.update(path.read_bytes())
+    return text.hexdigest()[:16]
 
 
 def cache_folder() -> str:
@@ -36,10 +53,7 @@ def cache_folder() -> str:
     home = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
     base = Path(home) if home else Path.home() / ".cache"
     base = Path(os.environ.get("NUMBA_CACHE_DIR") or base / "granufab")
-    text = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
-        text.update(path.read_bytes())
-    name = f"kernels-{text.hexdigest()[:16]}"
+    name = f"kernels-{kernels_hash()}"
     try:
         (base / name).mkdir(parents=True, exist_ok=True)
     except OSError:  # no home to write in: the kernels are then compiled once per machine start

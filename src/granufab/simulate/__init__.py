@@ -4,7 +4,7 @@ from granufab.simulate.loading import Biaxial, ConstantMean, Isotropic, Loading,
 from granufab.simulate.local_form import contact_frames, local_form, local_state
 from granufab.simulate.local_residual import local_errors
 from granufab.simulate.local_solve import solve_local
-from granufab.simulate.paths import Step, run, run_case, shear
+from granufab.simulate.paths import Kept, Step, run, run_case, shear
 from granufab.simulate.preparation import Prepared, compress, prepare
 from granufab.simulate.relaxation import HARD, Relaxed, overlaps, pressure_of, relax
 from granufab.simulate.sample import draw_radii, random_sample
@@ -17,6 +17,7 @@ __all__ = [
     "Case",
     "ConstantMean",
     "Isotropic",
+    "Kept",
     "Loading",
     "Material",
     "Prepared",

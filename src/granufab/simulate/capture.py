@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from granufab.simulate.step_report import StepReports
 from granufab.simulate.stepping import Simulation
 
 __all__ = ["StepTally", "capture_frame", "capture_packing", "measure_now", "merge", "series_row"]
+
+_WORST = ("residual", "residual_contact", "violation", "overlap", "pressure_error")
 
 
 def capture_packing(simulation: Simulation, *, reach: float = 0.05, source: str = "") -> Packing:
@@ -109,18 +112,14 @@ class StepTally:
     """Gathers step reports between two records."""
 
     def __init__(self) -> None:
-        self._start()
+        self.begin(StepStatistics())
 
-    def _start(self) -> None:
-        self._began = time.perf_counter()
-        self._steps, self._nonconverged, self._sweeps, self._updates = 0, 0, 0, 0
-        self._worst: dict[str, float] = {
-            "residual": 0.0,
-            "residual_contact": 0.0,
-            "violation": 0.0,
-            "overlap": 0.0,
-            "pressure_error": 0.0,
-        }
+    def begin(self, earlier: StepStatistics) -> None:
+        """Start with what was gathered before, see :meth:`now`."""
+        self._began, self._earlier = time.perf_counter(), earlier.seconds
+        self._steps, self._nonconverged = earlier.steps, earlier.nonconverged
+        self._sweeps, self._updates = int(earlier.sweeps), earlier.contact_updates
+        self._worst = {name: float(getattr(earlier, name)) for name in _WORST}
 
     def add(self, reports: StepReports) -> None:
         """Count steps."""
@@ -133,19 +132,23 @@ class StepTally:
             worst[name] = max(worst[name], float(getattr(reports, name).max()))
         worst["pressure_error"] = max(worst["pressure_error"], float(reports.stress_error.max()))
 
-    def take(self, kinetic_ratio: float) -> StepStatistics:
-        """The statistics since the last call, which start again."""
-        statistics = StepStatistics(
+    def now(self) -> StepStatistics:
+        """What is gathered, to begin with later; ``sweeps`` is their sum, not their mean."""
+        return StepStatistics(
             steps=self._steps,
             nonconverged=self._nonconverged,
-            sweeps=self._sweeps / max(self._steps, 1),
-            kinetic_ratio=kinetic_ratio,
+            sweeps=self._sweeps,
             contact_updates=self._updates,
-            seconds=time.perf_counter() - self._began,
+            seconds=self._earlier + time.perf_counter() - self._began,
             **self._worst,
         )
-        self._start()
-        return statistics
+
+    def take(self, kinetic_ratio: float) -> StepStatistics:
+        """The statistics since the last call, which start again."""
+        gathered = self.now()
+        self.begin(StepStatistics())
+        mean = gathered.sweeps / max(gathered.steps, 1)
+        return replace(gathered, sweeps=mean, kinetic_ratio=kinetic_ratio)
 
 
 def merge(parts: list[StepStatistics]) -> StepStatistics:

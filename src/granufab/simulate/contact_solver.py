@@ -115,6 +115,11 @@ class ContactSolver:
         return {**self.__dict__, "_plan": None, "_work": None}
 
     @property
+    def grain_order(self) -> IntArray:
+        """The grains chunk by chunk."""
+        return self._grains
+
+    @property
     def threads(self) -> int:
         """Threads that share a solve: as many as wanted, at most one for each chunk."""
         return min(self.team.most, self.chunk_count)

@@ -10,37 +10,38 @@ from typing import Any
 
 import numpy as np
 
-from granufab.errors import InvalidSettings
-from granufab.history import Frame, Recorder, Run, StepStatistics, series_dataset
-from granufab.packing import Array, Packing
-from granufab.simulate.capture import StepTally, capture_frame, merge, series_row
-from granufab.simulate.loading import Loading, loading_of_stage
+from granufab.errors import CorruptFile, InvalidSettings
+from granufab.history import Frame, FrameSource, Recorder, Run, series_dataset
+from granufab.kernels.step_arrays import MATRIX
+from granufab.packing import Cell, Grains, Packing
+from granufab.simulate.follower import Follower, Keeper, Step
+from granufab.simulate.loading import loading_of_stage
 from granufab.simulate.preparation import Prepared, prepare
 from granufab.simulate.scales import Scales
 from granufab.simulate.settings import Case, Material, Record, Sample, Solver, Stage
-from granufab.simulate.stepping import Simulation, Watch
+from granufab.simulate.stepping import Simulation
 from granufab.simulate.summary import summarise
 
-__all__ = ["Step", "run", "run_case", "shear"]
+__all__ = ["Kept", "Step", "run", "run_case", "shear"]
 
 Progress = Callable[[str, float], None]
-REST_ENERGY = 1e-8
-SECONDS_BETWEEN_NEWS = 0.3
-MANY = 10_000
-EARLY, LATE, SLACK = 1 + 1e-9, 1e-12, 1e-13
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Step:
-    """One stage of a path for :func:`run`.
+class Kept:
+    """Where a path is kept so that it can go on later.
 
     Attributes:
-        loading: what drives the cell.
-        strain: |Δε_q| to walk; None relaxes at constant stress until the grains rest.
+        keeper: keeps its states.
+        recorded: opens what was recorded so far, frames and series.
+        state: to go on from, or None at the start of the path.
+        sample: what a summary says of the sample, kept with it; filled when the sample is made.
     """
 
-    loading: Loading
-    strain: float | None
+    keeper: Keeper
+    recorded: Callable[[], Run]
+    state: Mapping[str, np.ndarray] | None
+    sample: dict[str, Any]
 
 
 class _Memory:
@@ -57,136 +58,6 @@ class _Memory:
         self.rows.append(row)
 
 
-class _Follower:
-    """Drives one simulation along its path and feeds the recorders."""
-
-    def __init__(
-        self,
-        simulation: Simulation,
-        recorders: Sequence[Recorder],
-        settings: Record,
-        name: str,
-        progress: Progress | None,
-        axes: Loading,
-    ) -> None:
-        self.simulation, self.recorders, self.settings = simulation, recorders, settings
-        self.progress, self.name = progress, name
-        self.tally, self.all = StepTally(), []
-        self.since_frame: list[StepStatistics] = []
-        self.place: dict[str, Any] = {
-            "name": name,
-            "eps_q": 0.0,
-            "eps_q_total": 0.0,
-            "stage": 0,
-            "inertial_number": 0.0,
-            "direction": axes.direction,
-            "extension": axes.extension,
-            "minor": None if axes.axisymmetric else axes.extension,
-            "z_definition": settings.z_definition,
-            "reach": min(settings.reach, simulation.solver.skin),
-        }
-        self.next_row = self.next_frame = 0.0
-        self.restless = False
-        self._told = 0.0
-
-    def start(self) -> None:
-        """Record the starting state with the forces it came with, at ε_q = 0."""
-        self.simulation.stress = self.simulation.stress_of_impulses()
-        self.write_row()
-        self.write_frame()
-        self.next_row = self.settings.series_interval * (1 - 1e-6)
-        self.next_frame = self.settings.frame_interval * (1 - 1e-6)
-
-    def stage(self, index: int, step: Step, done: float, total: float) -> None:
-        """Walk one stage; ``done`` and ``total`` are strains for the progress."""
-        simulation = self.simulation
-        simulation.set_loading(step.loading)
-        simulation.remove_drift()
-        rate = abs(step.loading.nominal_rate)
-        self.place["stage"] = index
-        self.place["inertial_number"] = rate * simulation.scales.inertial_time
-        if step.strain is None or rate == 0:
-            self._relax()
-            return
-        simulation.step_size_limit(step.strain, rate)
-        goal = abs(step.strain) * (1 - 1e-9)
-        walked = 0.0
-        while walked < goal:
-            walked += self._advance(MANY, goal - walked)
-            self._record(last=walked >= goal)
-            self._tell(f"stage {index + 1}: strain", (done + walked) / total)
-
-    def _relax(self, limit: int = 3000) -> None:
-        self.simulation.damping = 0.5
-        for _ in range(limit):
-            self._advance(1, np.inf)
-            if self.simulation.kinetic_ratio() < REST_ENERGY:
-                break
-        else:
-            self.restless = True
-        self.simulation.damping = 0.0
-        self._record(last=True)
-
-    def _advance(self, steps: int, goal: float) -> float:
-        """Steps up to the next record, or until ``goal`` is walked.
-
-        Returns:
-            The strain walked in the sense of the stage's own loading.
-        """
-        simulation, place = self.simulation, self.place
-        own, before = simulation.loading, simulation.strain
-        sense = 1.0 if own.deviatoric_rate >= 0 else -1.0
-        weight = np.outer(own.direction, own.direction) - np.outer(own.extension, own.extension)
-        due = (min(self.next_row, self.next_frame) - LATE) / EARLY - place["eps_q_total"]
-        watch = Watch(sense * weight, goal - SLACK, due - SLACK)
-        reports = simulation.advance(steps, watch)
-        changes = np.diff(reports.strain, axis=0, prepend=before[None])
-        walked = 0.0
-        for change in changes:
-            place["eps_q"] += _shear_of(change, place["direction"], place["extension"])
-            shear = _shear_of(change, own.direction, own.extension)
-            place["eps_q_total"] += abs(shear)
-            walked += sense * shear
-        self.tally.add(reports)
-        return walked
-
-    def _record(self, *, last: bool) -> None:
-        total = self.place["eps_q_total"] * EARLY + LATE
-        if total >= self.next_row or last:
-            self.write_row()
-            self.next_row = total + self.settings.series_interval * (1 - 1e-6)
-        if total >= self.next_frame or last:
-            self.write_frame()
-            self.next_frame = total + self.settings.frame_interval * (1 - 1e-6)
-
-    def write_row(self) -> None:
-        """Hand a row of the series to the recorders."""
-        statistics = self.tally.take(self.simulation.kinetic_ratio())
-        self.all.append(statistics)
-        self.since_frame.append(statistics)
-        row = series_row(self.simulation, self.place, statistics)
-        for recorder in self.recorders:
-            recorder.row(row)
-
-    def write_frame(self) -> None:
-        """Hand a complete frame to the recorders."""
-        frame = capture_frame(self.simulation, self.place, merge(self.since_frame))
-        self.since_frame = []
-        for recorder in self.recorders:
-            recorder.frame(frame)
-
-    def _tell(self, text: str, fraction: float) -> None:
-        now = time.monotonic()
-        if self.progress and now - self._told > SECONDS_BETWEEN_NEWS:
-            self._told = now
-            self.progress(f"{text} {self.place['eps_q']:.3f}", min(fraction, 1.0))
-
-
-def _shear_of(strain: Array, direction: Array, extension: Array) -> float:
-    """Deviatoric part of a strain along two axes, contraction positive."""
-    return float(direction @ strain @ direction - extension @ strain @ extension)
-
-
 def run(
     packing: Packing,
     path: Sequence[Step],
@@ -198,6 +69,7 @@ def run(
     progress: Progress | None = None,
     name: str = "run",
     settings: Mapping[str, Any] | None = None,
+    kept: Kept | None = None,
 ) -> Run:
     """Follow a path of stages from a packing, by Contact Dynamics.
 
@@ -215,6 +87,8 @@ def run(
         progress: called with a text and the fraction done.
         name: of the path.
         settings: provenance kept with the result.
+        kept: keeps states to go on from; nothing is then kept in memory, the returned run reads
+            what was recorded.
     Raises:
         InvalidSettings: the path is empty.
         NotConverged: a step misses the tolerance and the solver is ``strict``.
@@ -224,29 +98,25 @@ def run(
     material, solver = material or Material(), solver or Solver()
     record_settings = record_settings or Record()
     memory = _Memory()
-    began = time.perf_counter()
-    first = next((s.loading for s in path if s.loading.deviatoric_rate), path[0].loading)
     simulation = Simulation(packing, path[0].loading, material=material, solver=solver)
-    recorders = [memory] if record is None else [memory, record]
-    follower = _Follower(simulation, recorders, record_settings, name, progress, first)
-    total = sum(abs(step.strain or 0.0) for step in path) or 1.0
+    follower = Follower(
+        simulation,
+        path,
+        [one for one in (None if kept else memory, record) if one is not None],
+        record_settings,
+        name=name,
+        tell=progress,
+        keeper=None if kept is None else kept.keeper,
+    )
+    if kept is not None and kept.state is not None:
+        follower.resume(kept.state)
     interrupted = False
-    done = 0.0
     try:
-        follower.start()
-        for index, step in enumerate(path):
-            follower.stage(index, step, done, total)
-            done += abs(step.strain or 0.0)
+        follower.walk()
     except KeyboardInterrupt:
         interrupted = True
-    seconds = time.perf_counter() - began
-    summary = summarise(simulation, follower.all, memory.frames, seconds)
-    summary["interrupted"] = interrupted
-    if follower.restless:
-        summary["warnings"].append(
-            f"an isotropic stage did not come to rest: kinetic energy / pV is "
-            f"{summary['kinetic_ratio']:.1e}"
-        )
+        if follower.settled:
+            follower.keep()
     attributes = {
         "criterion": "force",
         "z_definition": record_settings.z_definition,
@@ -254,13 +124,31 @@ def run(
         "dimension": simulation.dimension,
         "tolerance": solver.tolerance,
     }
+    result = kept.recorded() if kept else None
     return Run(
-        series_source=partial(series_dataset, memory.rows, attributes),
-        frames=memory.frames,
+        series_source=partial(series_dataset, memory.rows, attributes)
+        if result is None
+        else result.series_source,
+        frames=memory.frames if result is None else result.frames,
         settings=dict(settings or {}),
-        summary=summary,
+        summary=_summary(follower, memory.frames if result is None else result.frames, interrupted),
         name=name,
     )
+
+
+def _summary(
+    follower: Follower, frames: FrameSource | Sequence[Frame], interrupted: bool
+) -> dict[str, Any]:
+    summary = summarise(
+        follower.simulation, follower.whole, frames, follower.inertial_max, follower.spent()
+    )
+    summary["interrupted"] = interrupted
+    if follower.restless:
+        summary["warnings"].append(
+            f"an isotropic stage did not come to rest: kinetic energy / pV is "
+            f"{summary['kinetic_ratio']:.1e}"
+        )
+    return summary
 
 
 def _stage_rate(stage: Stage, simulation_time: float) -> float:
@@ -276,6 +164,7 @@ def run_case(
     record: Recorder | None = None,
     progress: Progress | None = None,
     start: Prepared | Packing | None = None,
+    kept: Kept | None = None,
 ) -> Run:
     """Prepare the sample that a case describes and follow its path.
 
@@ -284,14 +173,18 @@ def run_case(
         record: receives frames and rows as they come.
         progress: called with a text and the fraction done.
         start: a sample made before, instead of preparing one.
+        kept: keeps states to go on from, as in :func:`run`; with one, no sample is prepared.
     Raises:
         NotConverged: the wanted coordination cannot be reached, or a strict solver fails.
     """
     tell = progress or (lambda text, fraction: None)
-    began = time.perf_counter()
-    prepared = start or prepare(case.sample, progress=lambda t, f: tell(t, 0.5 * f))
-    packing = prepared.packing if isinstance(prepared, Prepared) else prepared
-    preparation = time.perf_counter() - began
+    if kept is not None and kept.state is not None:
+        packing = _held_sample(kept.state)
+        sample = kept.sample
+    else:
+        packing, sample = _sample(case, start, lambda t, f: tell(t, 0.5 * f))
+        if kept is not None:
+            kept.sample.update(sample)
     scales = Scales.of(packing, case.sample.pressure)
     path = []
     for stage in case.path:
@@ -314,10 +207,44 @@ def run_case(
         progress=lambda t, f: tell(t, 0.5 + 0.5 * f),
         name=case.name,
         settings=case.model_dump(mode="json"),
+        kept=kept,
     )
-    summary = {**result.summary, **_sample_summary(prepared, preparation)}
-    summary["seed"] = case.sample.seed if isinstance(prepared, Prepared) else None
-    return replace(result, summary=summary)
+    return replace(result, summary={**result.summary, **sample})
+
+
+def _sample(
+    case: Case, start: Prepared | Packing | None, tell: Progress
+) -> tuple[Packing, dict[str, Any]]:
+    """The sample, and what a summary says of it."""
+    began = time.perf_counter()
+    prepared = start or prepare(case.sample, progress=tell)
+    packing = prepared.packing if isinstance(prepared, Prepared) else prepared
+    seed = case.sample.seed if isinstance(prepared, Prepared) else None
+    return packing, {**_sample_summary(prepared, time.perf_counter() - began), "seed": seed}
+
+
+def _held_sample(held: Mapping[str, np.ndarray]) -> Packing:
+    """The grains and the cell of a kept state.
+
+    Raises:
+        CorruptFile: something is missing.
+    """
+    try:
+        return Packing(
+            grains=Grains(
+                position=held["position"],
+                radius=held["radius"],
+                mass=held["mass"],
+                number=held["number"],
+            ),
+            cell=Cell(
+                matrix=held["tensors"][MATRIX],
+                periodic=tuple(bool(p) for p in held["periodic"]),
+                origin=held["origin"],
+            ),
+        )
+    except KeyError as error:
+        raise CorruptFile(f"kept state: {error} is missing") from None
 
 
 def _sample_summary(prepared: Prepared | Packing, seconds: float) -> dict[str, Any]:

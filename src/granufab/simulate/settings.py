@@ -227,6 +227,10 @@ class Record(_Settings):
     z_definition: ZDefinition = Field(
         default="z_backbone", description="definition of z on figures"
     )
+    checkpoint_seconds: Positive = Field(default=300.0, description="wall time between checkpoints")
+    checkpoint_strain: Positive | None = Field(
+        default=None, description="strain between checkpoints; default by wall time alone"
+    )
 
     @field_validator("criterion")
     @classmethod

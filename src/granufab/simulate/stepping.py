@@ -372,14 +372,17 @@ class Simulation:
         )  # fmt: skip
         solver.arrange(self.position, matrix, origin)
         self.candidates.divide(solver.chunk, solver.chunk_count)
-        count = self.candidates.count
-        self.memory.reserve(count)
-        solver.slots(count // WIDTH + FEWEST_BATCHES, coupled=self.coupled)
+        self.make_room()
         self.memory.walked[:] = 0.0
-        control = self.memory.notes.control
-        control[STRAIN_WALKED], control[FARTHEST] = 0.0, 0.0
+        self.memory.notes.control[[STRAIN_WALKED, FARTHEST]] = 0.0
         self.searches += 1
         self._clock.seconds["search"] += time.perf_counter() - began
+
+    def make_room(self) -> None:
+        """Memory for the contacts that the candidates can become."""
+        count = self.candidates.count
+        self.memory.reserve(count)
+        self.contact_solver.slots(count // WIDTH + FEWEST_BATCHES, coupled=self.coupled)
 
     def measure_gaps(self) -> None:
         """Normals, lengths and gaps of the candidates; impulses turn with the normals."""

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from granufab.fabric import homogeneity
-from granufab.history import Frame, StepStatistics, frame_before
-from granufab.simulate.capture import merge
+from granufab.history import Frame, FrameSource, StepStatistics, frame_before
 from granufab.simulate.stepping import Simulation
 
 __all__ = ["summarise"]
@@ -18,20 +17,20 @@ HOMOGENEITY_STRAIN, HOMOGENEITY_GRAINS = 0.1, 200
 
 def summarise(
     simulation: Simulation,
-    statistics: list[StepStatistics],
-    frames: Sequence[Frame],
+    whole: StepStatistics,
+    frames: FrameSource | Sequence[Frame],
+    inertial: float,
     seconds: float,
 ) -> dict[str, Any]:
     """What a person wants to know of a finished path, as plain data.
 
     Args:
         simulation: the system at the end of the path.
-        statistics: of every recorded interval.
+        whole: statistics of all steps.
         frames: recorded states.
+        inertial: largest inertial number of a stage.
         seconds: wall time of the path.
     """
-    whole = merge(statistics)
-    inertial = max((frame.inertial_number for frame in frames), default=0.0)
     summary: dict[str, Any] = {
         "steps": whole.steps,
         "nonconverged_steps": whole.nonconverged,
@@ -73,9 +72,9 @@ def summarise(
     return summary
 
 
-def _add_homogeneity(summary: dict[str, Any], frames: Sequence[Frame]) -> None:
+def _add_homogeneity(summary: dict[str, Any], frames: FrameSource | Sequence[Frame]) -> None:
     """Variance of the local strain over the last part of the path; warns of shear bands."""
-    if not frames or frames[-1].packing.grains.count < HOMOGENEITY_GRAINS:
+    if len(frames) == 0 or frames[-1].packing.grains.count < HOMOGENEITY_GRAINS:
         return
     before = frame_before(frames, -1, HOMOGENEITY_STRAIN)
     if before is None:
