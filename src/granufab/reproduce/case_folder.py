@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from granufab.errors import GranufabError, InvalidSettings
+from granufab.errors import BrokenState, GranufabError, InvalidSettings, NotConverged
 from granufab.history import Run
 from granufab.io import (
     Checkpoint,
@@ -193,10 +193,13 @@ class _Job:
                 run = self.simulate(case, record=writer, progress=self.tell, **given)
                 run = replace(run, summary=_with_notes(run.summary, notes, checkpoints))
                 writer.close(None if run.summary.get("interrupted") else run.summary)
-        except BaseException:
+        except BaseException as error:
             if writer.frame_count == 0:  # nothing worth keeping: a rerun needs no force
                 for name in ("run.h5", "settings.toml"):
                     (self.folder / name).unlink(missing_ok=True)
+            elif isinstance(error, BrokenState | NotConverged):
+                held = f"{writer.frame_count} good frames before it are in {writer.path}"
+                raise type(error)(f"{error}; {held}") from None
             raise
         return _left(case, self.folder, run)
 
