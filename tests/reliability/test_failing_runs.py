@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from run_digest import digest
 
 import granufab as gf
 import granufab.simulate.paths as paths
-from conftest import digest
 from granufab.cli import main
 from granufab.io import read_checkpoint
 from granufab.reproduce.case_folder import run_into_folder

@@ -11,8 +11,8 @@ import time
 from pathlib import Path
 
 import pytest
+from run_digest import digest
 
-from conftest import digest
 from granufab.errors import InvalidSettings
 from granufab.reproduce import case_folder, checkpoints
 from granufab.reproduce.case_folder import RUN_FILES, run_into_folder
