@@ -132,6 +132,25 @@ def test_a_signal_ends_a_run_with_code_3(granufab, tmp_path: Path, number: signa
     assert json.loads(granufab("info", out / "run.h5", "--json").out)["frames"] >= 1
 
 
+def test_a_time_limit_ends_with_code_3_and_the_run_goes_on(granufab, tmp_path: Path) -> None:
+    case = tmp_path / "case.toml"
+    case.write_text(CASE.replace("strain = 0.02", "strain = 0.06"), encoding="utf-8")
+    for out in (tmp_path / "whole", tmp_path / "parts"):
+        limit = ("--max-walltime", "0:00:0.7", "--resume") if out.name == "parts" else ()
+        codes = [granufab("run", case, "--out", out, *limit)]
+        while codes[-1].code == 3:
+            assert "--max-walltime is over; go on with --resume" in codes[-1].err
+            assert len(codes) < 60
+            codes.append(granufab("run", case, "--out", out, *limit))
+        assert codes[-1].code == 0, codes[-1].err
+    series = [(tmp_path / name / "series.csv").read_bytes() for name in ("whole", "parts")]
+    assert series[0] == series[1]
+    for text in ("soon", "0", "-5", "1:2:3:4", "nan"):
+        done = granufab("run", case, "--out", tmp_path / "other", f"--max-walltime={text}")
+        assert done.code == 2
+        assert "h:m:s" in done.err
+
+
 def _wait_for_frames(path: Path, process: subprocess.Popen[str]) -> None:
     """Until the run file has grown past its header, by several frames."""
     for _ in range(1200):

@@ -130,3 +130,40 @@ def test_other_shapes_than_disks_and_spheres_are_refused(granufab, tmp_path: Pat
     done = granufab("run", "--start", file, "--cell", "8,4,4", "--out", tmp_path / "out")
     assert done.code == 2
     assert "not disks or spheres" in done.err
+
+
+def test_an_imported_state_starts_as_the_files_it_came_from(
+    granufab, resting: gf.Packing, tmp_path: Path
+) -> None:
+    """A run file that ``import`` wrote has no masses, and overlaps of soft grains."""
+    table, file = tmp_path / "soft.csv", tmp_path / "imported.h5"
+    table.write_text(softened(resting), encoding="utf-8")
+    read = ("--cell", cell_of(resting), "--periodic", "xy")
+    assert granufab("import", table, *read, "-o", file).code == 0
+    done = granufab("run", "--start", file, "--set", "sample.pressure=2", *PATH)
+    assert done.code == 0, done.err
+    start = summary(tmp_path / "imported")["start"]
+    assert start["relaxed"]["overlap"][0] > 1e-3 > start["relaxed"]["overlap"][1]
+    assert any("masses: from sample.density" in line for line in start["notes"])
+
+
+def test_a_cell_that_is_all_but_empty_is_refused(
+    granufab, resting: gf.Packing, tmp_path: Path
+) -> None:
+    table = tmp_path / "soft.csv"
+    table.write_text(softened(resting), encoding="utf-8")
+    done = granufab("run", "--start", table, "--cell", "1e4,1e4", "--out", tmp_path / "out", *PATH)
+    assert done.code == 2
+    assert "give the cell in the units of the positions (--cell)" in done.err
+
+
+def test_a_damaged_state_asks_for_another_frame(granufab, tmp_path: Path) -> None:
+    """``run`` takes one state, so it has no --skip-damaged to point to."""
+    table = tmp_path / "series.csv"
+    rows = [f"{k},{x},{y},0.5" for k in range(3) for x, y in ((0, 0), (1, 0), (0, 1), (1, 1))]
+    rows[-1] = "2,1,1,-0.5"
+    table.write_text("\n".join(["frame,x,y,r", *rows]) + "\n", encoding="utf-8")
+    done = granufab("run", "--start", table, "--cell", "2,2", "--out", tmp_path / "out")
+    assert done.code == 2
+    assert "choose another sample.frame" in done.err
+    assert "--skip-damaged" not in done.err

@@ -35,6 +35,12 @@ def info(
     print_pairs("", [(name.replace("_", " "), value) for name, value in pairs])
 
 
+def _size(path: Path) -> int:
+    """Bytes of a file, or of the files in a folder."""
+    files = path.iterdir() if path.is_dir() else (path,)
+    return sum(file.stat().st_size for file in files if file.is_file())
+
+
 def _describe_foreign(opened: Opened) -> dict[str, Any]:
     """What is known from the first state."""
     packing = opened.run.frames[0].packing
@@ -51,6 +57,6 @@ def _describe_foreign(opened: Opened) -> dict[str, Any]:
         "periodic": None if cell is None else list(cell.periodic),
         "frames": len(opened.run.frames),
         **opened.skipped(),
-        "bytes": sum(file.stat().st_size for file in opened.files if file.is_file()),
+        "bytes": sum(_size(file) for file in opened.files),
         "notes": list(opened.summary.notes),
     }

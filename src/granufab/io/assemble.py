@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile, GranufabError, InvalidPacking, InvalidSettings, MissingData
+from granufab.io.cell_of_frame import cell_of
 from granufab.io.distinct_bodies import check_distinct
-from granufab.io.found import FoundCell, FoundContacts, FoundFrame
+from granufab.io.found import FoundContacts, FoundFrame
 from granufab.io.import_summary import ImportSummary
 from granufab.io.nearest_image import nearest_images
 from granufab.io.read_options import ReadOptions
@@ -64,7 +65,7 @@ def _assembled(found: FoundFrame, options: ReadOptions, summary: ImportSummary) 
         spin=_spin(found.spin, keep, len(axes)),
         number=number[keep],
     )
-    cell = _cell(found, options, axes, grains)
+    cell = cell_of(found, options, axes, grains)
     contacts = None
     if found.contacts is not None:
         listed = _Listed(found, number, keep, axes)
@@ -111,8 +112,24 @@ def _axes(found: FoundFrame, options: ReadOptions, summary: ImportSummary) -> li
     if wanted == 3 or (wanted is None and (len(flat) != 1 or len(found.position) < 4)):
         return [0, 1, 2]
     normal = flat[-1] if flat else 2
+    if options.dimension == 2:
+        _check_layer(found, normal)
     summary.conventions["dimension"] = f"2, in the plane of {'xyz'.replace('xyz'[normal], '')}"
     return [k for k in range(3) if k != normal]
+
+
+def _check_layer(found: FoundFrame, normal: int) -> None:
+    """Refuse to call grains disks that lie above each other."""
+    if found.radius is None or len(found.position) == 0:
+        return
+    bodies = slice(None) if found.wall is None else ~found.wall
+    place = np.asarray(found.position, float)[bodies, normal]
+    thick = 2 * np.max(np.asarray(found.radius, float)[bodies], initial=0.0)
+    if len(place) and np.ptp(place) > thick:
+        raise InvalidSettings(
+            f"dimension is 2, but the grains of {found.place} spread over {np.ptp(place):.3g} "
+            f"along {'xyz'[normal]}, more than a diameter"
+        )
 
 
 def _kept_bodies(
@@ -147,49 +164,6 @@ def _spin(value: Array | None, keep: NDArray[np.bool_], dimension: int) -> Array
         return None
     spin = np.asarray(value, float)[keep]
     return spin[:, -1:] if dimension == 2 else spin
-
-
-def _cell(found: FoundFrame, options: ReadOptions, axes: list[int], grains: Grains) -> Cell | None:
-    lowest = (grains.position - grains.radius[:, None]).min(axis=0)
-    given = options.box(len(axes), lowest)
-    if given is not None and not _same_edges(given, found.cell, axes):
-        return Cell(matrix=given.matrix, periodic=given.periodic, origin=given.origin)
-    box = found.cell
-    if box is None:
-        return None
-    use = axes if len(box.matrix) == 3 else list(range(len(axes)))
-    periodic = tuple(box.periodic[k] for k in use)
-    if options.periodic is not None:
-        periodic = tuple("xyz"[k] in options.periodic for k in use)
-    matrix, origin = _tilts(box, use, periodic), np.array(box.origin, float)[use]
-    free = [k for k, axis in enumerate(use) if box.free and box.free[axis] and not periodic[k]]
-    if len(free) == len(use):
-        return None
-    for k in free:  # such a bound is where the outermost grains end
-        low = grains.position[:, k] - grains.radius
-        high = grains.position[:, k] + grains.radius
-        origin[k] = low.min()
-        matrix[k, k] = high.max() - origin[k]
-    return Cell(matrix=matrix, periodic=periodic, origin=origin)
-
-
-def _same_edges(given: FoundCell, box: FoundCell | None, axes: list[int]) -> bool:
-    """Whether the user's edges are those of the box: it then keeps the tilt that was found."""
-    if box is None:
-        return False
-    edges = np.diag(box.matrix)[axes if len(box.matrix) == 3 else slice(len(axes))]
-    return np.allclose(edges, np.diag(given.matrix), rtol=1e-12, atol=0.0)
-
-
-def _tilts(box: FoundCell, use: list[int], periodic: tuple[bool, ...]) -> Array:
-    """The lattice of the axes in use; an axis with walls has no tilt."""
-    matrix = np.array(box.matrix, float)[np.ix_(use, use)]
-    for k, wraps in enumerate(periodic):
-        if not wraps:
-            edge = matrix[k, k]
-            matrix[k, :], matrix[:, k] = 0.0, 0.0
-            matrix[k, k] = edge
-    return matrix
 
 
 def _contacts(

@@ -26,8 +26,10 @@ from granufab.io.import_summary import ImportSummary
 from granufab.io.read_options import ReadOptions
 from granufab.packing import Array, IntArray, Packing
 
-__all__ = ["ForeignFrames", "foreign_run"]
+__all__ = ["SKIPS", "ForeignFrames", "foreign_run"]
 
+SKIPS = "; skip_damaged (--skip-damaged) reads the other frames"
+"""What the message of a damaged frame ends with where the others can be read."""
 UNDEFORMED = 1e-9
 """Largest change of an edge, as a share of the cell, of a cell that does not deform."""
 
@@ -213,7 +215,7 @@ class ForeignFrames(Sequence[Frame]):
         all_alike = isinstance(error, MissingData) and self._start is None
         if self._options.skip_damaged or len(self._source) < 2 or all_alike:
             return error
-        return type(error)(f"{error}; skip_damaged (--skip-damaged) reads the other frames")
+        return type(error)(f"{error}{SKIPS}")
 
     def _packing(self, found: FoundFrame, number: int) -> Packing:
         """The state, its grains in the order of the first frame read; counted once."""

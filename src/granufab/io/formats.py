@@ -98,6 +98,10 @@ def read(path: Path | str, *more: Path | str, format: str | None = None, **optio
     if isinstance(known, Format):
         if len(paths) > 1:
             raise InvalidSettings(f"{paths[1]}: a run file is complete, give one at a time")
+        if options:
+            raise InvalidSettings(
+                f"{next(iter(options))!r} is for other programs' data, {paths[0]} is a run file"
+            )
         return known.read(paths[0])
     check_given(known, paths)
     if format is None:

@@ -52,8 +52,9 @@ def open_plain(path: Path) -> Iterator[PlainHdf5]:
         raise
     except BROKEN as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        where = f"of {path.stat().st_size} bytes" if checked is None else f"at {checked.at}"
-        raise CorruptFile(f"{path}: is truncated or damaged {where} ({reason})") from None
+        size = path.stat().st_size
+        where = f", {size} bytes long" if checked is None else f" at {checked.at}"
+        raise CorruptFile(f"{path}: is truncated or damaged{where} ({reason})") from None
 
 
 class PlainHdf5:

@@ -56,13 +56,20 @@ class ReadOptions:
                 f"cell has {len(self.cell)} numbers, allowed: edges (2 or 3), or lower corner and "
                 "edges (4 or 6)"
             )
+        if self.cell is not None:
+            edges = self.cell[-len(self.cell) // 2 :] if len(self.cell) > 3 else self.cell
+            if not np.isfinite(self.cell).all() or min(edges) <= 0:
+                numbers = ",".join(f"{number:g}" for number in self.cell)
+                raise InvalidSettings(f"cell is {numbers}, its edges must be finite and > 0")
         if self.periodic is not None and set(self.periodic) - set("xyz"):
             raise InvalidSettings(f"periodic is {self.periodic!r}, allowed: axes of xyz, or none")
-        if self.radius is not None and not self.radius > 0:
-            raise InvalidSettings(f"radius is {self.radius!r}, must be > 0")
-        if self.friction is not None and not self.friction >= 0:
-            raise InvalidSettings(f"friction is {self.friction!r}, must be ≥ 0")
-        self.direction(2)
+        if self.radius is not None and not 0 < self.radius < np.inf:
+            raise InvalidSettings(f"radius is {self.radius!r}, must be finite and > 0")
+        if self.friction is not None and not 0 <= self.friction < np.inf:
+            raise InvalidSettings(f"friction is {self.friction!r}, must be finite and ≥ 0")
+        if self.strain is not None and not np.isfinite(self.strain):
+            raise InvalidSettings(f"strain is {self.strain!r}, must be finite")
+        self.direction(3)
         self.frame_slice()
 
     def frame_slice(self) -> slice:
@@ -96,29 +103,47 @@ class ReadOptions:
         names = "xyz"
         if self.axis in names and len(self.axis) == 1:
             place = names.index(self.axis)
-            if place < dimension:
-                return np.eye(dimension)[place]
-            if dimension == 2:
-                return None
+            if place >= dimension:
+                raise InvalidSettings(f"axis is {self.axis!r}, 2D data have x and y")
+            return np.eye(dimension)[place]
         try:
             vector = np.array([float(part) for part in self.axis.split(",")])
         except ValueError:
             vector = np.zeros(0)
-        if len(vector) not in (2, 3) or not np.linalg.norm(vector) > 0:
+        known = len(vector) in (2, 3) and np.isfinite(vector).all()
+        vector = np.append(vector, 0.0)[:dimension] if known else np.zeros(1)
+        if not np.linalg.norm(vector) > 0:
             raise InvalidSettings(
                 f"axis is {self.axis!r}, allowed: x, y, z or components such as 0,1,0"
             )
-        vector = vector[:dimension]
         return vector / np.linalg.norm(vector)
 
-    def box(self, dimension: int, lowest: np.ndarray) -> FoundCell | None:
+    def repeats(self, axes: str) -> tuple[bool, ...] | None:
+        """Whether each of the axes is periodic, or None where the user does not tell.
+
+        Args:
+            axes: names of the axes of the data.
+        Raises:
+            InvalidSettings: a periodic axis is none of the data's.
+        """
+        if self.periodic is None:
+            return None
+        if set(self.periodic) - set(axes):
+            raise InvalidSettings(f"periodic is {self.periodic!r}, the axes of the data are {axes}")
+        return tuple(name in self.periodic for name in axes)
+
+    def box(self, axes: str, lowest: np.ndarray) -> FoundCell | None:
         """The cell that the user gives, with the corner at ``lowest`` where none is given.
 
+        Args:
+            axes: names of the axes of the data.
+            lowest: lower corner, shape (D,).
         Raises:
             InvalidSettings: the numbers are for another dimension.
         """
         if self.cell is None:
             return None
+        dimension = len(axes)
         given = np.array(self.cell, float)
         if len(given) not in (dimension, 2 * dimension):
             raise InvalidSettings(
@@ -127,7 +152,5 @@ class ReadOptions:
             )
         origin = given[:dimension] if len(given) == 2 * dimension else lowest
         matrix = np.diag(given[-dimension:])
-        axes = "xyz"[:dimension] if self.periodic is None else self.periodic
-        return FoundCell(
-            matrix=matrix, origin=origin, periodic=tuple(name in axes for name in "xyz"[:dimension])
-        )
+        periodic = self.repeats(axes) or (True,) * dimension
+        return FoundCell(matrix=matrix, origin=origin, periodic=periodic)

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.typing import ColorType
 
+from granufab.errors import MissingData
 from granufab.plots.curves import LABELS, Results, collect, column, mean_curve
 from granufab.plots.limits import Limits, critical_marker, limit_lines
 from granufab.plots.style import new_figure, style
@@ -37,7 +38,7 @@ def path(
     Returns:
         The panel.
     Raises:
-        MissingData: a series lacks a column, or there is no series.
+        MissingData: a series lacks a column, there is no series, or no state has contacts.
     """
     groups = collect(*results)
     with style():
@@ -90,6 +91,8 @@ def _fit_view(
     z = np.concatenate([column(series, z_definition) for series in every])
     a = np.concatenate([column(series, "a_signed") for series in every])
     ordinate = a * z if scaled else a
+    if not np.isfinite(ordinate).any():
+        raise MissingData(f"no state has both {z_definition} and a, so there is no path to draw")
     low, high = float(np.nanmin(z)), float(np.nanmax(z))
     top, bottom = max(float(np.nanmax(ordinate)), 0.0), min(float(np.nanmin(ordinate)), 0.0)
     margin, tall = max(0.07 * (high - low), 0.02), max(top - bottom, 1e-3)

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from granufab.errors import MissingData
 from granufab.plots.curves import LABELS, Results, collect, column, mean_curve, stages
 from granufab.plots.style import FIT, letter_panels, new_figure, style
 
@@ -37,9 +38,12 @@ def series(
     Returns:
         The panels, from top to bottom.
     Raises:
-        MissingData: a series lacks a column, or there is no series.
+        MissingData: a series lacks a column, there is no series, or no strain is known.
     """
     groups = collect(*results)
+    for label, repeats in groups.items():
+        if not np.isfinite(column(repeats[0], against)).any():
+            raise MissingData(f"{label}: no strain is known ({against}); give --strain (per frame)")
     with style():
         panels = list(ax) if ax is not None else new_figure(rows=len(columns), height=4.2)[1]
         for index, (panel, name) in enumerate(zip(panels, columns, strict=True)):

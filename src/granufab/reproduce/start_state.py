@@ -1,8 +1,8 @@
 """The state from which a run starts: a frame of a run file, or of another program's data.
 
-A frame of an own run file starts a run as it is. A foreign state gets masses from the density where
-it has none, the pressure of its contact forces where the case gives none, and overlaps of soft
-grains are relaxed (:func:`granufab.simulate.relax`).
+A frame of an own run file starts a run as it is. A foreign state, also one that was imported into a
+run file, gets masses from the density where it has none, the pressure of its contact forces where
+the case gives none, and overlaps of soft grains are relaxed (:func:`granufab.simulate.relax`).
 """
 
 from __future__ import annotations
@@ -12,9 +12,10 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from granufab.errors import GranufabError, InvalidSettings, MissingData
+from granufab.errors import CorruptFile, GranufabError, InvalidSettings, MissingData
 from granufab.history import Run
 from granufab.io import ForeignFrames, read, read_column_map
+from granufab.io.foreign_run import SKIPS
 from granufab.packing import Packing
 from granufab.simulate.settings import Case, Reading, parse_case
 
@@ -54,7 +55,7 @@ def find_start(case: Case, folder: Path, progress: Progress | None = None) -> St
         progress: called while overlaps are relaxed.
     Raises:
         InvalidSettings: the state does not fit the case, or is the file to be written.
-        MissingData: it lacks what a simulation needs, or there is no such file or frame.
+        MissingData: it lacks what a simulation needs, or there is no such file.
         GranufabError: as of :func:`granufab.read`.
     """
     sample = case.sample
@@ -70,10 +71,11 @@ def find_start(case: Case, folder: Path, progress: Progress | None = None) -> St
     packing = _frame(run, files[0], sample.frame)
     case = _for_dimension(case, packing, files[0])
     summary: dict[str, Any] = {"files": list(files), "frame": sample.frame, "notes": []}
-    foreign = isinstance(run.frames, ForeignFrames)
-    if foreign:
-        read_lines = run.frames.summary.lines()  # type: ignore[union-attr]
+    if isinstance(run.frames, ForeignFrames):
+        read_lines = run.frames.summary.lines()
         summary["notes"] += [line for line in read_lines if not line.startswith("strain:")]
+    foreign = _is_foreign(run)
+    if foreign:
         packing = _with_mass(packing, case.sample.density, summary)
     own = run.settings.get("sample", {}) if not foreign else {}
     case = _for_pressure(case, packing, own.get("pressure"), summary)
@@ -115,6 +117,17 @@ def _open(files: tuple[str, ...], reading: Reading) -> Run:
         raise type(error)(f"sample.file {error}") from None
 
 
+def _is_foreign(run: Run) -> bool:
+    """Whether another program made the states, imported into a run file or not."""
+    return isinstance(run.frames, ForeignFrames) or "format" in run.settings
+
+
+def _are_round(run: Run) -> bool:
+    if isinstance(run.frames, ForeignFrames):
+        return run.frames.summary.round_grains
+    return bool(run.summary.get("round_grains", True))
+
+
 def _frame(run: Run, file: str, index: int) -> Packing:
     count = len(run.frames)
     if count == 0:
@@ -123,8 +136,12 @@ def _frame(run: Run, file: str, index: int) -> Packing:
         raise InvalidSettings(
             f"sample.frame is {index}, {file} holds {count} frames (0..{count - 1}, or -1)"
         )
-    packing = run.frames[index].packing
-    if isinstance(run.frames, ForeignFrames) and not run.frames.summary.round_grains:
+    try:
+        packing = run.frames[index].packing
+    except (CorruptFile, MissingData) as error:
+        text = str(error).replace(SKIPS, "; choose another sample.frame")
+        raise type(error)(f"sample.file {text}") from None
+    if not _are_round(run):
         raise InvalidSettings(
             f"sample.file {file}: its grains are not disks or spheres; a run takes round grains"
         )

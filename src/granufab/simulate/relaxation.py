@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from granufab.errors import BrokenState, InvalidPacking, NotConverged
-from granufab.fabric.stress import stress_tensor
+from granufab.fabric.stress import solid_fraction, stress_tensor
 from granufab.fabric.tensors import mean_part
 from granufab.packing import Packing, require
 from granufab.simulate.capture import capture_packing, measure_now
@@ -35,6 +35,8 @@ DAMPING, RATE_CAP = 0.5, 0.05
 STAGE_STEPS, GATHER_STEPS = 600, 6000
 GATHERED_ENERGY, ALLOWED_ENERGY, STAGE_ENERGY, LAST_ENERGY = 1e-4, 1e-5, 1e-7, 1e-8
 MISSED_PRESSURE = 1e-2
+EMPTIEST = 0.01
+"""Least solid fraction to start from: emptier cells are wrong, and searching them takes memory."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -115,11 +117,18 @@ def relax(
         progress: called with a text and the fraction done.
     Raises:
         MissingData: there is no cell, or grains have no masses.
-        InvalidPacking: overlaps are beyond half a diameter: these are no contacts.
+        InvalidPacking: overlaps are beyond half a diameter: these are no contacts; or the cell is
+            all but empty.
         NotConverged: the grains do not come to rest under p.
     """
     began = time.perf_counter()
     require(packing.cell, "cell lengths", "give the cell of the state to start from (--cell)")
+    filled = solid_fraction(packing)
+    if filled < EMPTIEST:
+        raise InvalidPacking(
+            f"the grains of the state to start from fill {filled:.2g} of their cell, at least "
+            f"{EMPTIEST} is needed: give the cell in the units of the positions (--cell)"
+        )
     pressure = pressure or pressure_of(packing) or 1.0
     simulation = _simulation(packing, friction, wall_friction, pressure)
     start = simulation.candidates
