@@ -21,6 +21,7 @@ from granufab.cli import (
     predict,
     reproduce,
     run,
+    sweep,
 )
 
 __all__ = ["app"]
@@ -35,6 +36,7 @@ app = typer.Typer(
 )
 app.command("new")(new.new)
 app.command("run")(run.run)
+app.command("sweep")(sweep.sweep)
 app.command("reproduce")(reproduce.reproduce)
 app.command("import")(import_data.import_data)
 app.command("export")(export.export)
