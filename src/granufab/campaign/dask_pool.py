@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from importlib import import_module
@@ -13,7 +14,7 @@ from uuid import uuid4
 from granufab.campaign.case_work import Outcome, Task, do_task, tell_now_and_then
 from granufab.campaign.ledger import Ledger
 from granufab.campaign.local_pool import MOST_DEATHS, PATIENCE
-from granufab.errors import InvalidSettings, MissingData
+from granufab.errors import GranufabError, InvalidSettings, MissingData
 from granufab.reproduce.case_folder import RunCase
 
 __all__ = ["QUEUES", "check_dask", "run_dask"]
@@ -166,11 +167,17 @@ class _Campaign:
                     self._submit(self.tasks[name], run_case)
 
     def _finished(self, seconds: float) -> list[Any]:
-        distributed = _need("distributed")
-        with suppress(TimeoutError, distributed.TimeoutError):
-            distributed.wait(list(self.futures), timeout=seconds, return_when="FIRST_COMPLETED")
+        """Futures that have ended, after a moment where there are none."""
         self._hear()
-        return [future for future in self.futures if future.done()]
+        ended = [future for future in self.futures if future.done()]
+        if ended:
+            return ended
+        if self.client.status not in ("running", "connecting", "newly-created"):
+            raise GranufabError(
+                "the connection to the Dask scheduler is lost; the same command continues"
+            )
+        time.sleep(seconds)
+        return []
 
     def _hear(self) -> None:
         with suppress(Empty):
@@ -201,9 +208,9 @@ class _Campaign:
             idle = [future for future, name in self.futures.items() if name not in running]
             self.client.cancel(idle)
             busy = [future for future, name in self.futures.items() if name in running]
-            distributed = _need("distributed")
-            with suppress(TimeoutError, distributed.TimeoutError):
-                distributed.wait(busy, timeout=PATIENCE)
+            deadline = time.monotonic() + PATIENCE
+            while time.monotonic() < deadline and not all(future.done() for future in busy):
+                time.sleep(POLL)
             for future in busy:
                 if future.status == "finished":
                     self.ledger.ended(self.futures[future], future.result())

@@ -12,7 +12,7 @@ import granufab
 from granufab.campaign.case_work import Task
 from granufab.campaign.dask_pool import check_dask, run_dask
 from granufab.campaign.expansion import Member, expand
-from granufab.campaign.folder import CampaignFolder, state_of_folder
+from granufab.campaign.folder import CampaignFolder, seconds_of_run, state_of_folder
 from granufab.campaign.identity import digest_of
 from granufab.campaign.ledger import UNWANTED, Ledger, Row, read_table
 from granufab.campaign.local_pool import run_local
@@ -198,13 +198,14 @@ def _row(place: CampaignFolder, member: Member, earlier: Row | None, retry: bool
     if state == "failed" and retry:
         _forget_job(folder)
         state, reason = state_of_folder(folder, member.digest)
+    seconds = 0.0 if earlier is None else earlier.seconds
     return Row(
         id=member.id,
         parameters=member.parameters,
         seed=member.seed,
         state=state,
         reason=reason,
-        seconds=0.0 if earlier is None else earlier.seconds,
+        seconds=seconds_of_run(folder) if state == "done" and not seconds else seconds,
     )
 
 

@@ -15,7 +15,7 @@ from granufab.errors import GranufabError, InvalidSettings, MissingData
 from granufab.io import write_json
 from granufab.simulate.settings import load_case
 
-__all__ = ["CampaignFolder", "is_finished", "state_of_folder"]
+__all__ = ["CampaignFolder", "is_finished", "seconds_of_run", "state_of_folder"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +94,15 @@ def is_finished(folder: Path, digest: str) -> bool:
         return case_digest(load_case(folder / "settings.toml")) == digest
     except (OSError, ValueError, AttributeError, GranufabError):
         return False
+
+
+def seconds_of_run(folder: Path) -> float:
+    """Wall time of a finished run, as its summary tells."""
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        return float(summary["seconds"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return 0.0
 
 
 def state_of_folder(folder: Path, digest: str) -> tuple[State, str]:

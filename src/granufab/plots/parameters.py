@@ -93,6 +93,8 @@ def parameter_curves(
             axes[0].legend(title=_label(chosen, by), loc="best")
         if len(axes) > 1:
             letter_panels(axes)
+            for panel in axes[:-1]:
+                panel.tick_params(labelbottom=False)
     return list(axes)
 
 
