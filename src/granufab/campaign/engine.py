@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from granufab.campaign.manifest import write_manifest
 from granufab.campaign.results import gather
 from granufab.campaign.settings import Sweep, load_sweep
 from granufab.errors import InvalidSettings, MissingData
-from granufab.io import write_dataset, write_json
+from granufab.io import RunLock, write_dataset, write_json
 from granufab.reproduce.case_folder import RunCase, check_writable
 from granufab.simulate.team import core_count
 
@@ -69,34 +69,43 @@ def run_campaign(
     Returns:
         The summary, as ``summary.json`` holds it.
     Raises:
-        InvalidSettings: the campaign, one of its cases or an option is bad; nothing was run.
+        InvalidSettings: the campaign, one of its cases or an option is bad, or another process
+            runs it; nothing was run.
         MissingData: an extra is not installed; nothing was run.
     """
-    campaign = _open(sweep, Path(folder), retry)
-    ledger = campaign.ledger
-    where = dask or "processes"
-    crew = plan_workers(len(campaign.members), workers, threads, limited=dask in (None, "local"))
+    sweep, members = _expanded(sweep)
+    crew = plan_workers(len(members), workers, threads, limited=dask in (None, "local"))
     if dask is not None:
         check_dask(dask)
     began = time.monotonic()
-    ledger.write()
-    interrupted = False
-    ledger.shown = progress
-    if not gather_only:
-        tasks = _tasks(campaign, crew[1])
-        try:
-            if dask is None:
-                run_local(tasks, ledger, workers=crew[0], run_case=run_case)
-            else:
-                run_dask(tasks, ledger, where=dask, workers=crew[0], run_case=run_case)
-        except KeyboardInterrupt:
-            interrupted = True
-        finally:
-            ledger.shown = None
-            ledger.stop()
-            ledger.write()
-    how = {"where": where, "workers": crew[0], "threads": crew[1]}
-    return _conclude(campaign, interrupted, time.monotonic() - began, how)
+    check_writable(Path(folder))
+    with RunLock(folder):
+        campaign = _open(sweep, members, Path(folder), retry)
+        campaign.ledger.write()
+        campaign.ledger.shown = progress
+        interrupted = not gather_only and not _run(campaign, dask, crew, run_case)
+        how = {"where": dask or "processes", "workers": crew[0], "threads": crew[1]}
+        return _conclude(campaign, interrupted, time.monotonic() - began, how)
+
+
+def _run(
+    campaign: _Campaign, dask: str | None, crew: tuple[int, int], run_case: RunCase | None
+) -> bool:
+    """Run what is not done; False where it was interrupted."""
+    ledger = campaign.ledger
+    tasks = _tasks(campaign, crew[1])
+    try:
+        if dask is None:
+            run_local(tasks, ledger, workers=crew[0], run_case=run_case)
+        else:
+            run_dask(tasks, ledger, where=dask, workers=crew[0], run_case=run_case)
+    except KeyboardInterrupt:
+        return False
+    finally:
+        ledger.shown = None
+        ledger.stop()
+        ledger.write()
+    return True
 
 
 def prepare_manifest(
@@ -120,20 +129,16 @@ def prepare_manifest(
     Raises:
         InvalidSettings: the campaign or one of its cases is bad.
     """
-    campaign = _open(sweep, Path(folder), retry)
-    crew = plan_workers(len(campaign.members), workers, threads, limited=False)
-    done = {row.id for row in campaign.ledger.in_state("done")}
-    write_manifest(
-        campaign.place,
-        campaign.members,
-        done,
-        name=campaign.sweep.name,
-        threads=crew[1],
-        workers=crew[0],
-    )
-    campaign.ledger.write()
-    how = {"where": "manifest", "workers": crew[0], "threads": crew[1]}
-    return _conclude(campaign, False, 0.0, how)
+    sweep, members = _expanded(sweep)
+    workers, threads = plan_workers(len(members), workers, threads, limited=False)
+    check_writable(Path(folder))
+    with RunLock(folder):
+        campaign = _open(sweep, members, Path(folder), retry)
+        done = {row.id for row in campaign.ledger.in_state("done")}
+        crew = {"threads": threads, "workers": workers}
+        write_manifest(campaign.place, campaign.members, done, name=sweep.name, **crew)
+        campaign.ledger.write()
+        return _conclude(campaign, False, 0.0, {"where": "manifest", **crew})
 
 
 def plan_workers(
@@ -165,15 +170,19 @@ def plan_workers(
     return workers, threads
 
 
-def _open(sweep: Sweep | Path | str, folder: Path, retry: bool) -> _Campaign:
-    """Expand and validate everything, then look at what the folder holds already."""
-    where = "sweep" if isinstance(sweep, Sweep) else str(sweep)
-    if not isinstance(sweep, Sweep):
-        sweep = load_sweep(sweep)
+def _expanded(sweep: Sweep | Path | str) -> tuple[Sweep, list[Member]]:
+    """The campaign and its cases, all validated."""
+    if isinstance(sweep, Sweep):
+        return sweep, expand(sweep)
+    loaded = load_sweep(sweep)
+    return loaded, expand(loaded, where=str(sweep))
+
+
+def _open(sweep: Sweep, members: Sequence[Member], folder: Path, retry: bool) -> _Campaign:
+    """See what the folder holds already."""
     place = CampaignFolder(folder)
     earlier = {digest_of(row.id): row for row in read_table(place.table)}
-    members = [_as_before(member, earlier) for member in expand(sweep, where=where)]
-    check_writable(folder)
+    members = [_as_before(member, earlier) for member in members]
     rows = {m.id: _row(place, m, earlier.pop(m.digest, None), retry) for m in members}
     unwanted = [replace(row, reason=UNWANTED) for row in earlier.values()]
     place.write_notes(sweep.name, sweep.names(), members)

@@ -13,6 +13,7 @@ from granufab.campaign.expansion import Member
 from granufab.campaign.identity import case_digest
 from granufab.errors import GranufabError, InvalidSettings, MissingData
 from granufab.io import write_json
+from granufab.reproduce.checkpoints import CHECKPOINT
 from granufab.simulate.settings import load_case
 
 __all__ = ["CampaignFolder", "is_finished", "seconds_of_run", "state_of_folder"]
@@ -112,7 +113,7 @@ def state_of_folder(folder: Path, digest: str) -> tuple[State, str]:
     code, reason = _job(folder)
     if code in (1, 2):
         return "failed", reason
-    begun = any((folder / name).exists() for name in ("run.h5", "checkpoint", "checkpoint.npz"))
+    begun = any((folder / name).exists() for name in ("run.h5", CHECKPOINT))
     return ("interrupted" if begun else "waiting"), ""
 
 

@@ -14,14 +14,14 @@ __all__ = ["case_digest", "case_id", "digest_of"]
 
 DIGITS = 12  # hexadecimal; among 1e5 cases two share them with a probability of 2e-5
 LONGEST_PREFIX = 60
-_FOUND = ("dimension", "grain_count", "pressure")
+_FOUND = ("dimension", "grain_count", "diameter", "pressure")
 
 
 def case_digest(case: Case) -> str:
     """Hash of the resolved settings of a case, its name apart.
 
-    A case that starts from a file gets its dimension, grain count and pressure from there when it
-    is run, so these do not count.
+    A case that starts from a file gets some settings of its sample from there when it is run;
+    these do not count.
     """
     data = case.model_dump(mode="json", exclude={"name"})
     if case.sample.file is not None:
