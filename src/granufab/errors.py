@@ -5,6 +5,7 @@ from __future__ import annotations
 __all__ = [
     "CorruptFile",
     "GranufabError",
+    "IncompleteFile",
     "InvalidPacking",
     "InvalidProblem",
     "InvalidSettings",
@@ -40,6 +41,10 @@ class UnknownFormat(GranufabError, ValueError):
 
 class CorruptFile(GranufabError, OSError):
     """A file is truncated or its content contradicts itself."""
+
+
+class IncompleteFile(UserWarning):
+    """A file is truncated, but what is there of it is sound; shown as a warning."""
 
 
 class NotConverged(GranufabError, RuntimeError):

@@ -205,7 +205,7 @@ def test_files_that_are_not_ours(tmp_path: Path) -> None:
 def test_a_newer_schema_names_both_versions(finished: Path) -> None:
     with h5py.File(finished, "r+") as file:
         file.attrs["schema_version"] = 7
-    with pytest.raises(UnknownFormat, match=r"schema_version 7.* up to 1"):
+    with pytest.raises(UnknownFormat, match=r"schema_version 7.* up to 2"):
         gio.read(finished)
 
 

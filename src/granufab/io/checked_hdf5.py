@@ -13,8 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile, GranufabError, MissingData, UnknownFormat
+from granufab.io.run_file_checksum import text_checksum
 from granufab.io.schema import FORMAT_NAME, SCHEMA_VERSION, Entry, named
-from granufab.io.unclosed_hdf5 import SUPERBLOCK_BYTES, UnclosedFile, is_unclosed
+from granufab.io.unclosed_hdf5 import (
+    SUPERBLOCK_BYTES,
+    UnclosedFile,
+    is_truncated,
+    is_unclosed,
+)
 
 __all__ = [
     "BROKEN",
@@ -52,7 +58,7 @@ def is_run_file(path: Path, head: bytes) -> bool:
     if not head.startswith(HDF5_SIGNATURE):
         return False
     try:
-        with _open(path) as (file, _):
+        with _open(path) as (file, *_):
             return file.attrs.get("format") == FORMAT_NAME
     except BROKEN:
         return True
@@ -62,6 +68,8 @@ def is_run_file(path: Path, head: bytes) -> bool:
 def opened(path: Path) -> Iterator[CheckedFile]:
     """Open a run file for reading, also while it is written or after its writer was killed.
 
+    A truncated one opens too if its beginning is sound and it carries checksums.
+
     Raises:
         MissingData: there is no such file.
         UnknownFormat: it is no run file, or of a newer schema.
@@ -70,8 +78,8 @@ def opened(path: Path) -> Iterator[CheckedFile]:
     if not path.is_file():
         raise MissingData(f"{path}: " + ("is a folder" if path.is_dir() else "no such file"))
     try:
-        with _open(path) as (file, unclosed):
-            yield CheckedFile(file, path, unclosed)
+        with _open(path) as (file, unclosed, truncated):
+            yield CheckedFile(file, path, unclosed, truncated)
     except GranufabError:
         raise
     except BROKEN as error:
@@ -80,16 +88,17 @@ def opened(path: Path) -> Iterator[CheckedFile]:
 
 
 @contextmanager
-def _open(path: Path) -> Iterator[tuple[h5py.File, bool]]:
-    """An HDF5 file, and whether its writer has not closed it."""
+def _open(path: Path) -> Iterator[tuple[h5py.File, bool, bool]]:
+    """An HDF5 file, whether its writer has not closed it, and whether it was longer then."""
     with path.open("rb") as stream:
         head = stream.read(SUPERBLOCK_BYTES)
     if not head.startswith(HDF5_SIGNATURE):
         raise UnknownFormat(f"{path}: is not an HDF5 file, so not a granufab run file")
     unclosed = is_unclosed(head)
+    truncated = not unclosed and is_truncated(head, path.stat().st_size)
     with ExitStack() as stack:
         try:
-            if unclosed:
+            if unclosed or truncated:
                 stream = stack.enter_context(UnclosedFile(path))
                 file = stack.enter_context(h5py.File(stream, "r"))
             else:
@@ -97,7 +106,7 @@ def _open(path: Path) -> Iterator[tuple[h5py.File, bool]]:
         except OSError as error:
             reason = str(error).splitlines()[0]
             raise CorruptFile(f"{path}: is truncated or damaged ({reason})") from None
-        yield file, unclosed
+        yield file, unclosed, truncated
 
 
 class CheckedFile:
@@ -107,27 +116,31 @@ class CheckedFile:
         file: the open file.
         path: for messages.
         unclosed: whether its writer has not closed it.
+        truncated: whether it was longer when it was closed.
     """
 
-    def __init__(self, file: h5py.File, path: Path, unclosed: bool) -> None:
+    def __init__(self, file: h5py.File, path: Path, unclosed: bool, truncated: bool) -> None:
         self._file = file
         self._known: dict[str, h5py.Dataset] = {}
         self.path = path
         if file.attrs.get("format") != FORMAT_NAME:
             raise UnknownFormat(f"{path}: is HDF5, but not a granufab run file")
-        version = self.whole("schema_version")
-        if version > SCHEMA_VERSION:
+        self.version = self.whole("schema_version")
+        if self.version > SCHEMA_VERSION:
             raise UnknownFormat(
-                f"{path}: has schema_version {version}, this granufab reads up to "
+                f"{path}: has schema_version {self.version}, this granufab reads up to "
                 f"{SCHEMA_VERSION}; update granufab"
             )
         self.dimension = self.whole("dimension")
         self.grain_count = self.whole("grain_count")
         size = path.stat().st_size
-        if unclosed and size < self.counter("file_bytes"):
-            raise self.corrupt(
-                f"is truncated: {size} bytes of {self.counter('file_bytes')}; copy it again"
-            )
+        self.truncated = truncated or (unclosed and size < self.counter("file_bytes"))
+        if self.truncated and self.version == 1:
+            raise self.corrupt(f"is truncated at {size} bytes; copy it again")
+        if self.version > 1:
+            checksum = text_checksum(self.version, *self.texts().values())
+            if self.whole("checksum") != checksum:
+                raise self.corrupt("settings or provenance do not match their checksum")
 
     def corrupt(self, text: str) -> CorruptFile:
         """The exception for a contradiction in this file."""
@@ -139,6 +152,10 @@ class CheckedFile:
         if not isinstance(value, str):
             raise self.corrupt(f"attribute {name} is not text")
         return value
+
+    def texts(self) -> dict[str, str]:
+        """The text attributes that a copy of the file takes over, by name in order."""
+        return {name: self.text(name) for name in ("created", "provenance", "settings")}
 
     def whole(self, name: str) -> int:
         """A whole-number attribute of the root group."""
@@ -175,12 +192,31 @@ class CheckedFile:
         if started and (self.dimension not in (2, 3) or self.grain_count < 1):
             raise self.corrupt(f"{self.grain_count} grains in {self.dimension} dimensions")
         for entry in names:
-            if entry.bit is not None and entry.name not in self._file:
-                continue  # of a later granufab; a frame that claims to hold it is refused
+            if not self.holds(entry):
+                continue
             length = len(self._dataset(entry))
             if length < count:
                 raise self.corrupt(f"{entry.name} holds {length} of {count} records")
         return count
+
+    def holds(self, entry: Entry) -> bool:
+        """False for an entry that may be missing, because an earlier granufab knew it not.
+
+        That are optional entries (a frame that claims to hold one is refused), columns of the
+        series, and what later versions of the schema have added.
+        """
+        column = entry.growth == "rows" and entry.dtype == "float64"
+        if entry.since > self.version:
+            return False
+        return entry.name in self._file or not (entry.bit is not None or column)
+
+    def has(self, names: tuple[Entry, ...]) -> bool:
+        """Whether all these entries are in the file."""
+        return all(entry.name in self._file for entry in names)
+
+    def length(self, entry: Entry) -> int:
+        """Records in a growing dataset, complete or not."""
+        return len(self._dataset(entry))
 
     def once(self, entry: Entry) -> NDArray | None:
         """A dataset that does not grow; None where it may be missing and is."""

@@ -15,43 +15,38 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from granufab.errors import InvalidPacking, InvalidSettings
 from granufab.history import SERIES_UNITS, Frame
 from granufab.io.provenance import provenance as collect_provenance
+from granufab.io.run_file_checksum import frame_checksum, row_checksums, text_checksum
+from granufab.io.run_file_layout import RAGGED, create_file, growing, number
+from granufab.io.run_lock import RunLock
 from granufab.io.schema import (
     FORMAT_NAME,
+    FRAME_CHECKSUM,
     NAME_BYTES,
+    ROW_CHECKSUM,
     SCHEMA,
     SCHEMA_VERSION,
-    Entry,
-    derived_branch,
     entries,
-    source_value,
 )
+from granufab.io.stored_frame import stored_frame
 from granufab.io.summary import json_text, plain
-from granufab.packing import Packing
+from granufab.packing import Grains
 
 __all__ = ["RunFileWriter"]
-
-_COMPRESSION: dict[str, Any] = {
-    "compression": "gzip",
-    "compression_opts": 1,
-    "shuffle": True,
-    "fletcher32": True,
-}
-_LARGEST_CHUNK = 16384
-_BRANCH_TOLERANCE = 1e-12
-_RAGGED = ("contacts", "wall_contacts")
 
 
 class RunFileWriter:
     """Write frames and series rows to an HDF5 run file as they come.
 
     A context manager and a :class:`granufab.history.Recorder`. Leaving the block closes the
-    file; only :meth:`close` with a summary marks the run as finished.
+    file; only :meth:`close` with a summary marks the run as finished. Until it is closed the
+    writer holds ``.<name>.lock`` beside the file, so that no other process writes there; it does
+    without where this process holds the folder by a :class:`granufab.io.run_lock.RunLock`.
 
     Args:
         path: the file; missing folders are made.
@@ -59,8 +54,8 @@ class RunFileWriter:
         provenance: added to versions, platform and CPU, which are recorded in any case.
         force: replace an existing file.
     Raises:
-        InvalidSettings: the file exists or cannot be written, or the settings' ``name`` is longer
-            than the file's schema allows.
+        InvalidSettings: the file exists, cannot be written or is written by another process, or
+            the settings' ``name`` is longer than the file's schema allows.
     """
 
     def __init__(
@@ -71,31 +66,68 @@ class RunFileWriter:
         provenance: Mapping[str, Any] | None = None,
         force: bool = False,
     ) -> None:
-        self.path = Path(path)
         _path_name(settings.get("name", ""))
-        attributes = {
-            "format": FORMAT_NAME,
-            "schema_version": SCHEMA_VERSION,
+        texts = {
             "created": datetime.now(UTC).isoformat(),
             "settings": json.dumps(settings, ensure_ascii=False, default=plain),
             "provenance": json_text({**collect_provenance(), **(provenance or {})}),
-            "dimension": 0,
-            "grain_count": 0,
         }
-        self._frames = 0
-        self._rows = 0
-        self._first: Packing | None = None
-        self._file = _create(self.path, force)
-        for name, value in attributes.items():
-            self._file.attrs[name] = value
-        self._counters = {e.name: _counter(self._file, e) for e in entries("scalar")}
-        self._data = {e.name: _dataset(self._file, e, (), 256) for e in entries("rows", "bytes")}
-        self._file.flush()
+        self._begin(Path(path), texts, force)
+
+    @classmethod
+    def of_texts(cls, path: Path | str, texts: Mapping[str, str]) -> Self:
+        """A writer of a new file with the texts of another one.
+
+        Args:
+            path: the file, which must not exist.
+            texts: the attributes ``created``, ``settings`` and ``provenance`` as they are stored.
+        Raises:
+            InvalidSettings: the file exists or cannot be written.
+        """
+        writer = cls.__new__(cls)
+        writer._begin(Path(path), texts, False)
+        return writer
+
+    @classmethod
+    def continued(cls, path: Path | str, *, frames: int, rows: int) -> Self:
+        """A writer that goes on with an existing run file, whole or left by a killed writer.
+
+        What is beyond ``frames`` and ``rows`` is dropped, a summary too. The file is changed in
+        place, in an order that leaves it readable at any moment. One of an older schema, or that
+        HDF5 cannot open for writing, is first replaced by a copy of its complete frames and rows.
+
+        Args:
+            path: the file.
+            frames: complete frames to keep.
+            rows: rows of the series to keep.
+        Raises:
+            MissingData: there is no such file.
+            UnknownFormat: it is no run file.
+            CorruptFile: it holds fewer sound frames or rows than that.
+            InvalidSettings: it cannot be written, or is written by another process.
+        """
+        from granufab.io.continued_run_file import open_to_continue  # it copies by this writer
+
+        writer = cls.__new__(cls)
+        writer.path = Path(path)
+        writer._lock = _locked(writer.path)
+        try:
+            writer._first, writer._file = open_to_continue(writer.path, frames, rows)
+            writer._resume(frames, rows)
+        except BaseException:
+            writer._release()
+            raise
+        return writer
 
     @property
     def frame_count(self) -> int:
         """Frames written so far."""
         return self._frames
+
+    @property
+    def row_count(self) -> int:
+        """Rows of the series written so far."""
+        return self._rows
 
     def __enter__(self) -> Self:
         return self
@@ -116,13 +148,13 @@ class RunFileWriter:
                 dimension, radius, mass or identity.
             OSError: it could not be written; the frames before it are safe.
         """
-        packing = frame.packing
+        grains = frame.packing.grains
         if self._first is None:
-            self._start(packing)
+            self._start(grains)
         else:
-            self._check_same_grains(self._first, packing)
+            self._check_same_grains(self._first, grains)
         try:
-            self._append_frame(frame)
+            self._append_frame(stored_frame(frame))
             self._commit("complete_frames", self._frames + 1)
         except (OSError, RuntimeError) as error:
             raise self._failed(f"frame {self._frames}", error) from None
@@ -140,12 +172,13 @@ class RunFileWriter:
             raise InvalidSettings(
                 f"unknown series column {min(unknown)} (known: path, {', '.join(SERIES_UNITS)})"
             )
-        name = _path_name(row.get("path", ""))
+        values = {f"series/{name}": float(row.get(name, np.nan)) for name in SERIES_UNITS}
+        stored = {name: np.array([value]) for name, value in values.items()}
+        stored["series/path"] = np.array([_path_name(row.get("path", ""))], f"S{NAME_BYTES}")
         try:
-            for entry in entries("rows"):
-                column = entry.name.removeprefix("series/")
-                value = name if column == "path" else float(row.get(column, np.nan))
-                self._append(entry, self._rows, value)
+            for name, value in stored.items():
+                self._put(name, self._rows, value[0])
+            self._put(ROW_CHECKSUM, self._rows, row_checksums(stored, self._rows)[0])
             self._commit("complete_rows", self._rows + 1)
         except (OSError, RuntimeError) as error:
             raise self._failed(f"row {self._rows}", error) from None
@@ -161,63 +194,112 @@ class RunFileWriter:
             return
         try:
             if summary is not None:
-                text = np.frombuffer(json_text(summary).encode(), dtype=np.uint8)
+                text = json_text(summary).encode()
                 data = self._data["summary"]
                 data.resize((len(text),))
-                data[:] = text
+                data[:] = np.frombuffer(text, dtype=np.uint8)
+                checksum = text_checksum(self._frames, self._rows, text)
+                self._counters["summary_checksum"][()] = np.uint64(checksum)
                 self._commit("finished", 1)
         finally:
-            self._file.close()
+            try:
+                self._file.close()
+            finally:
+                self._release()
 
-    def _start(self, packing: Packing) -> None:
-        dimension, count = packing.dimension, packing.grains.count
+    def _begin(self, path: Path, texts: Mapping[str, str], force: bool) -> None:
+        self.path = path
+        self._frames = self._rows = 0
+        self._first: Grains | None = None
+        self._lock = _locked(path)
+        try:
+            self._file = create_file(path, force)
+            checksum = text_checksum(SCHEMA_VERSION, *(texts[name] for name in sorted(texts)))
+            attributes = {
+                "format": FORMAT_NAME,
+                "schema_version": SCHEMA_VERSION,
+                **texts,
+                "dimension": 0,
+                "grain_count": 0,
+                "checksum": np.uint64(checksum),
+            }
+            for name, value in attributes.items():
+                self._file.attrs[name] = value
+            self._counters: dict[str, Any] = {
+                e.name: number(self._file, e) for e in entries("scalar")
+            }
+            growth = entries("rows", "bytes")
+            self._data: dict[str, Any] = {e.name: growing(self._file, e, 0, 1024) for e in growth}
+            self._file.flush()
+        except BaseException:
+            self._release()
+            raise
+
+    def _resume(self, frames: int, rows: int) -> None:
+        """Take over an open file; what is to be dropped cannot come back after a kill."""
+        self._frames, self._rows = frames, rows
+        self._counters = {e.name: self._file[e.name] for e in entries("scalar")}
+        growths = ("frames", "frames + 1", "rows", "bytes", *RAGGED)
+        self._data = {e.name: self._file[e.name] for e in entries(*growths) if e.name in self._file}
+        if self._first is not None:
+            self._file.swmr_mode = True
+        counts = {"finished": 0, "summary_checksum": 0}
+        for name, value in {**counts, "complete_frames": frames, "complete_rows": rows}.items():
+            self._counters[name][()] = value
+            self._file.flush()
+        for name, kept in ((FRAME_CHECKSUM, frames), (ROW_CHECKSUM, rows)):
+            if name in self._data and len(self._data[name]) > kept:
+                self._data[name][kept:] = 0
+        self._file.flush()
+
+    def _start(self, grains: Grains) -> None:
+        dimension, count = grains.dimension, grains.count
         self._file.attrs["dimension"] = dimension
         self._file.attrs["grain_count"] = count
-        rows = min(max(count // 4, 64), _LARGEST_CHUNK)
         for entry in SCHEMA:
             if entry.growth == "grains":
-                value = getattr(packing.grains, entry.name.removeprefix("grains/"))
+                value = getattr(grains, entry.name.removeprefix("grains/"))
                 if value is not None:
                     self._file.create_dataset(entry.name, data=value, dtype=entry.dtype)
-            elif entry.growth in ("frames", "frames + 1", *_RAGGED):
-                shape = entry.row_shape(dimension, count)
-                self._data[entry.name] = _dataset(self._file, entry, shape, rows)
-        for group in _RAGGED:
-            start = self._data[f"{group}/start"]
-            start.resize((1,))
-            start[0] = 0
+            elif entry.growth in ("frames", "frames + 1", *RAGGED):
+                self._data[entry.name] = growing(self._file, entry, dimension, count)
+        for group in RAGGED:
+            self._put(f"{group}/start", 0, 0)
         self._file.flush()
         self._file.swmr_mode = True
-        self._first = packing
+        self._first = grains
 
-    def _append_frame(self, frame: Frame) -> None:
-        values = {e.name: source_value(frame, e.source) for e in SCHEMA if e.source}
-        held = {e.bit for e in SCHEMA if e.bit is not None and values[e.name] is not None}
-        values["frames/present"] = sum(1 << bit for bit in held)
-        if values["frames/time"] is None:
-            values["frames/time"] = np.nan
-        if _branch_is_derived(frame.packing):
-            values["contacts/branch"] = None
+    def _append_frame(self, values: dict[str, NDArray]) -> None:
         for entry in entries("frames"):
-            self._append(entry, self._frames, values[entry.name])
-        for group in _RAGGED:
-            start = self._data[f"{group}/start"]
-            first = int(start[self._frames])
-            source = getattr(frame.packing, group)
-            last = first + (0 if source is None else source.count)
+            if entry.name != FRAME_CHECKSUM:
+                self._put(entry.name, self._frames, values.get(entry.name))
+        for group in RAGGED:
+            name = f"{group}/start"
+            first = int(self._data[name][self._frames])
+            held = [values[entry.name] for entry in entries(group) if entry.name in values]
+            last = first + (len(held[0]) if held else 0)
             for entry in entries(group):
-                data = self._data[entry.name]
-                data.resize(last, axis=0)
-                if values[entry.name] is not None and last > first:
-                    data[first:last] = values[entry.name]
-            start.resize((self._frames + 2,))
-            start[self._frames + 1] = last
+                self._put_rows(entry.name, first, last, values.get(entry.name))
+            self._put(name, self._frames + 1, last)
+            values[name] = np.array([first, last])
+        self._put(FRAME_CHECKSUM, self._frames, np.uint64(frame_checksum(self._frames, values)))
 
-    def _append(self, entry: Entry, index: int, value: Any) -> None:
-        data = self._data[entry.name]
-        data.resize(index + 1, axis=0)
+    def _put(self, name: str, index: int, value: Any) -> None:
+        """Set one record; what an earlier run left there is replaced, also by nothing."""
+        data = self._data[name]
+        if len(data) <= index:
+            data.resize(index + 1, axis=0)
+        elif value is None:
+            value = data.fillvalue
         if value is not None:
             data[index] = value
+
+    def _put_rows(self, name: str, first: int, last: int, value: NDArray | None) -> None:
+        data = self._data[name]
+        if len(data) < last:
+            data.resize(last, axis=0)
+        if value is not None and last > first:
+            data[first:last] = value
 
     def _commit(self, counter: str, value: int) -> None:
         self._file.flush()
@@ -226,6 +308,10 @@ class RunFileWriter:
         self._counters[counter][()] = value
         self._file.flush()
 
+    def _release(self) -> None:
+        if self._lock is not None:
+            self._lock.release()
+
     def _failed(self, what: str, error: Exception) -> OSError:
         reason = str(error).splitlines()[0]
         return OSError(
@@ -233,9 +319,9 @@ class RunFileWriter:
             f"{self._frames} frames and {self._rows} rows before it are safe"
         )
 
-    def _check_same_grains(self, first: Packing, packing: Packing) -> None:
+    def _check_same_grains(self, first: Grains, grains: Grains) -> None:
         where = f"frame {self._frames}"
-        shapes = packing.grains.position.shape, first.grains.position.shape
+        shapes = grains.position.shape, first.position.shape
         if shapes[0] != shapes[1]:
             (count, now), (begun, before) = shapes
             raise InvalidPacking(
@@ -243,7 +329,7 @@ class RunFileWriter:
                 f"{before}D; write another file"
             )
         for name in ("radius", "mass", "number"):
-            old, new = getattr(first.grains, name), getattr(packing.grains, name)
+            old, new = getattr(first, name), getattr(grains, name)
             if old is new:
                 continue
             if old is None or new is None or not np.array_equal(old, new):
@@ -253,64 +339,19 @@ class RunFileWriter:
                 )
 
 
+def _locked(path: Path) -> RunLock | None:
+    """The file's lock; None where this process holds its folder's."""
+    if path.is_dir():
+        raise InvalidSettings(f"{path}: is a folder, expected a file name")
+    if RunLock.is_held_here(path.parent):
+        return None
+    lock = RunLock(path.parent, name=f".{path.name}.lock")
+    lock.acquire()
+    return lock
+
+
 def _path_name(name: object) -> bytes:
     stored = str(name).encode()
     if len(stored) > NAME_BYTES:
         raise InvalidSettings(f"name has {len(stored)} bytes, allowed at most {NAME_BYTES}: {name}")
     return stored
-
-
-def _branch_is_derived(packing: Packing) -> bool:
-    contacts = packing.contacts
-    if contacts is None or contacts.branch is None or contacts.gap is None:
-        return False
-    radius = packing.grains.radius
-    derived = derived_branch(radius, contacts.pair, contacts.normal, contacts.gap)
-    allowed = _BRANCH_TOLERANCE * (radius[contacts.pair[:, 0]] + radius[contacts.pair[:, 1]])
-    return bool((np.abs(contacts.branch - derived) <= allowed[:, None]).all())
-
-
-def _create(path: Path, force: bool) -> h5py.File:
-    if path.is_dir():
-        raise InvalidSettings(f"{path}: is a folder, expected a file name")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InvalidSettings(
-            f"{path.parent}: no folder can be made there ({error.strerror})"
-        ) from None
-    try:
-        if force:
-            path.unlink(missing_ok=True)
-        return h5py.File(path, "x", libver=("v110", "latest"), locking="best-effort")
-    except FileExistsError:
-        raise InvalidSettings(f"{path}: exists already; use force to replace it") from None
-    except OSError as error:
-        reason = error.strerror or str(error).splitlines()[0]
-        raise InvalidSettings(f"{path}: cannot be written ({reason})") from None
-
-
-def _counter(file: h5py.File, entry: Entry) -> h5py.Dataset:
-    return file.create_dataset(entry.name, data=0, dtype=entry.dtype)
-
-
-def _dataset(
-    file: h5py.File, entry: Entry, row_shape: tuple[int, ...], ragged_rows: int
-) -> h5py.Dataset:
-    """An empty dataset that can grow; large ones are compressed and checked by a checksum."""
-    large = entry.growth in _RAGGED or "grains" in entry.shape
-    if entry.growth in _RAGGED:
-        chunk = (ragged_rows, *row_shape)
-    elif "grains" in entry.shape:
-        chunk = (1, min(row_shape[0], _LARGEST_CHUNK), *row_shape[1:])
-    else:
-        chunk = (256, *row_shape)
-    return file.create_dataset(
-        entry.name,
-        shape=(0, *row_shape),
-        maxshape=(None, *row_shape),
-        chunks=chunk,
-        dtype=entry.dtype,
-        fillvalue=np.nan if entry.dtype == "float64" else None,
-        **(_COMPRESSION if large else {}),
-    )

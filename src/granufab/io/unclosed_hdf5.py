@@ -13,7 +13,14 @@ import struct
 from pathlib import Path
 from typing import Any
 
-__all__ = ["SUPERBLOCK_BYTES", "UnclosedFile", "is_unclosed", "lookup3"]
+__all__ = [
+    "SUPERBLOCK_BYTES",
+    "UnclosedFile",
+    "close_left_open",
+    "is_truncated",
+    "is_unclosed",
+    "lookup3",
+]
 
 SUPERBLOCK_BYTES = 48
 _VERSION, _FLAGS, _END, _CHECKSUM = 8, 11, 28, 44
@@ -25,16 +32,38 @@ def is_unclosed(head: bytes) -> bool:
     return len(head) >= SUPERBLOCK_BYTES and head[_VERSION] == 3 and head[_FLAGS] != 0
 
 
+def is_truncated(head: bytes, size: int) -> bool:
+    """Whether a file of ``size`` bytes with these first bytes was longer when it was closed."""
+    if len(head) < SUPERBLOCK_BYTES or head[_VERSION] != 3:
+        return False
+    return _is_sound(head) and size < struct.unpack_from("<Q", head, _END)[0]
+
+
+def close_left_open(path: Path) -> None:
+    """Remove the mark from a file whose writer was killed; others are left as they are.
+
+    Raises:
+        OSError: the file cannot be written, or its superblock is damaged.
+    """
+    with path.open("r+b") as stream:
+        head = stream.read(SUPERBLOCK_BYTES)
+        if is_unclosed(head):
+            clean = _closed(head, stream.seek(0, io.SEEK_END))
+            stream.seek(0)
+            stream.write(clean)
+
+
 class UnclosedFile(io.FileIO):
-    """A file object for ``h5py.File``; its superblock has no mark and its true length."""
+    """A file object for ``h5py.File``; its superblock has no mark and its true length.
+
+    Raises:
+        OSError: the superblock is damaged.
+    """
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "rb")
-        head = bytearray(super().read(SUPERBLOCK_BYTES))
-        head[_FLAGS] = 0
-        struct.pack_into("<Q", head, _END, self.seek(0, io.SEEK_END))
-        struct.pack_into("<I", head, _CHECKSUM, lookup3(bytes(head[:_CHECKSUM])))
-        self._head = bytes(head)
+        head = super().read(SUPERBLOCK_BYTES)
+        self._head = _closed(head, self.seek(0, io.SEEK_END))
 
     def readinto(self, buffer: Any, /) -> int:
         """Read from the current position; the superblock comes out clean."""
@@ -44,6 +73,21 @@ class UnclosedFile(io.FileIO):
         if start < stop:
             memoryview(buffer).cast("B")[: stop - start] = self._head[start:stop]
         return count
+
+
+def _closed(head: bytes, size: int) -> bytes:
+    """The superblock of a closed file of that size."""
+    if not _is_sound(head):
+        raise OSError("the superblock at byte 0 does not match its checksum")
+    clean = bytearray(head[:SUPERBLOCK_BYTES])
+    clean[_FLAGS] = 0
+    struct.pack_into("<Q", clean, _END, size)
+    struct.pack_into("<I", clean, _CHECKSUM, lookup3(bytes(clean[:_CHECKSUM])))
+    return bytes(clean)
+
+
+def _is_sound(head: bytes) -> bool:
+    return struct.unpack_from("<I", head, _CHECKSUM)[0] == lookup3(head[:_CHECKSUM])
 
 
 def lookup3(data: bytes) -> int:
