@@ -10,7 +10,8 @@ import errno
 import os
 import signal
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from granufab.cli.application import app
@@ -18,6 +19,7 @@ from granufab.cli.interruption import watch_signals
 from granufab.errors import (
     CorruptFile,
     GranufabError,
+    IncompleteFile,
     InvalidPacking,
     InvalidSettings,
     MissingData,
@@ -42,9 +44,22 @@ _BAD_PATH = {
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit the process with its code."""
-    with watch_signals():
+    with watch_signals(), warnings.catch_warnings():
+        warnings.showwarning = _shown(warnings.showwarning)
         code = _exit_code(arguments)
     sys.exit(code)
+
+
+def _shown(usual: Callable[..., None]) -> Callable[..., None]:
+    """Show warnings about files in one line, others as usual."""
+
+    def show(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+        if issubclass(category, IncompleteFile):
+            print("granufab: warning:", " ".join(str(message).split()), file=sys.stderr)
+        else:
+            usual(message, category, *place, **more)
+
+    return show
 
 
 def _exit_code(arguments: Sequence[str] | None) -> int:

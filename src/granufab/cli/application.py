@@ -9,6 +9,7 @@ import typer
 from granufab.cli import (
     balance,
     bench,
+    check,
     criterion,
     doctor,
     export,
@@ -19,6 +20,7 @@ from granufab.cli import (
     new,
     plot,
     predict,
+    repair,
     reproduce,
     run,
 )
@@ -45,6 +47,8 @@ app.command("fit")(fit.fit)
 app.command("predict")(predict.predict)
 app.command("plot")(plot.plot)
 app.command("info")(info.info)
+app.command("check")(check.check)
+app.command("repair")(repair.repair)
 app.command("doctor")(doctor.doctor)
 app.command("bench")(bench.bench)
 

@@ -27,6 +27,7 @@ __all__ = [
     "HDF5_SIGNATURE",
     "LARGEST_RATIO",
     "CheckedFile",
+    "first_line",
     "is_run_file",
     "opened",
     "storage_fault",
@@ -35,6 +36,7 @@ __all__ = [
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 _LARGEST_CHUNK_BYTES = 16 * 2**20
+_LEAST_RECORD = 128  # bytes that any frame and any row takes, uncompressed
 LARGEST_RATIO = 1100  # deflate shrinks by 1032 at most, so no dataset declares more than this
 BROKEN = (
     OSError,
@@ -83,8 +85,12 @@ def opened(path: Path) -> Iterator[CheckedFile]:
     except GranufabError:
         raise
     except BROKEN as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise CorruptFile(f"{path}: cannot be read as a run file ({reason})") from None
+        raise CorruptFile(f"{path}: cannot be read as a run file ({first_line(error)})") from None
+
+
+def first_line(error: Exception) -> str:
+    """The first line of an exception's text, or its kind."""
+    return str(error).splitlines()[0] if str(error) else type(error).__name__
 
 
 @contextmanager
@@ -104,8 +110,7 @@ def _open(path: Path) -> Iterator[tuple[h5py.File, bool, bool]]:
             else:
                 file = stack.enter_context(h5py.File(path, "r", locking="best-effort"))
         except OSError as error:
-            reason = str(error).splitlines()[0]
-            raise CorruptFile(f"{path}: is truncated or damaged ({reason})") from None
+            raise CorruptFile(f"{path}: is truncated or damaged ({first_line(error)})") from None
         yield file, unclosed, truncated
 
 
@@ -123,6 +128,7 @@ class CheckedFile:
         self._file = file
         self._known: dict[str, h5py.Dataset] = {}
         self.path = path
+        self.unclosed = unclosed
         if file.attrs.get("format") != FORMAT_NAME:
             raise UnknownFormat(f"{path}: is HDF5, but not a granufab run file")
         self.version = self.whole("schema_version")
@@ -134,6 +140,7 @@ class CheckedFile:
         self.dimension = self.whole("dimension")
         self.grain_count = self.whole("grain_count")
         size = path.stat().st_size
+        self.most_records = size // _LEAST_RECORD
         self.truncated = truncated or (unclosed and size < self.counter("file_bytes"))
         if self.truncated and self.version == 1:
             raise self.corrupt(f"is truncated at {size} bytes; copy it again")
@@ -177,6 +184,10 @@ class CheckedFile:
         if not isinstance(value, dict):
             raise self.corrupt(f"{name} is not a JSON object")
         return value
+
+    def promised(self, counter: str) -> int:
+        """Records that a counter promises, but no more than the file has room for."""
+        return min(self.counter(counter), self.most_records)
 
     def counter(self, name: str) -> int:
         """A scalar counter, ≥ 0."""

@@ -28,7 +28,14 @@ from numpy.typing import NDArray
 from granufab.errors import CorruptFile, InvalidSettings, MissingData
 from granufab.io.summary import plain
 
-__all__ = ["Checkpoint", "is_checkpoint", "previous_of", "read_checkpoint", "write_checkpoint"]
+__all__ = [
+    "Checkpoint",
+    "is_checkpoint",
+    "previous_of",
+    "read_checkpoint",
+    "verify_checkpoint",
+    "write_checkpoint",
+]
 
 _SIGNATURE = b"granufab-ckpt-1\n"
 _SIZES = struct.Struct("<QQ")
@@ -132,6 +139,27 @@ def read_checkpoint(path: Path | str) -> Checkpoint:
     raise CorruptFile("; ".join(fault for fault in faults if not fault.endswith("no such file")))
 
 
+def verify_checkpoint(path: Path | str) -> None:
+    """Compare a checkpoint file with its checksum, in blocks.
+
+    Raises:
+        CorruptFile: it is not whole and right.
+    """
+    path = Path(path)
+    with path.open("rb") as stream:
+        rest, _, head = _sizes(stream, path)
+        digest = hashlib.sha256(head)
+        rest -= _HEAD + _DIGEST
+        while rest:
+            block = stream.read(min(rest, _BLOCK))
+            if not block:
+                break
+            digest.update(block)
+            rest -= len(block)
+        if rest or stream.read(_DIGEST) != digest.digest():
+            raise CorruptFile(f"{path}: its bytes do not match their checksum")
+
+
 def _temporary_of(path: Path) -> Path:
     return path.with_name(f".{path.name}.tmp")
 
@@ -191,7 +219,8 @@ def _read(path: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
         raise CorruptFile(f"{path}: header contradicts itself ({reason})") from None
 
 
-def _content(stream: BinaryIO, path: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
+def _sizes(stream: BinaryIO, path: Path) -> tuple[int, int, bytes]:
+    """Length of the file, length of the header, and the bytes read."""
     present = os.fstat(stream.fileno()).st_size
     head = stream.read(_HEAD)
     if not head.startswith(_SIGNATURE):
@@ -201,6 +230,11 @@ def _content(stream: BinaryIO, path: Path) -> tuple[dict[str, NDArray], dict[str
     length, size = _SIZES.unpack(head[len(_SIGNATURE) :])
     if size != present or not 2 <= length <= present - _HEAD - _DIGEST:
         raise CorruptFile(f"{path}: has {present} bytes, its header declares {size}")
+    return present, length, head
+
+
+def _content(stream: BinaryIO, path: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
+    present, length, head = _sizes(stream, path)
     header = stream.read(length)
     content = json.loads(header)
     arrays: dict[str, NDArray] = {}

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile, GranufabError
 from granufab.history import Frame, StepStatistics
-from granufab.io.checked_hdf5 import CheckedFile
+from granufab.io.checked_hdf5 import BROKEN, CheckedFile, first_line
 from granufab.io.run_file_checksum import frame_checksum
 from granufab.io.schema import FRAME_CHECKSUM, Entry, derived_branch, entries, named
 from granufab.packing import Array, Cell, Contacts, Grains, Packing, WallContacts
@@ -33,6 +33,8 @@ def read_frame(file: CheckedFile, index: int, source: str) -> Frame:
         raise
     except GranufabError as error:
         raise file.corrupt(f"frame {index}: {error}") from None
+    except BROKEN as error:
+        raise file.corrupt(f"frame {index} cannot be read ({first_line(error)})") from None
 
 
 def check_frame(file: CheckedFile, index: int) -> None:

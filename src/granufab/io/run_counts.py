@@ -27,9 +27,10 @@ def frame_count(file: CheckedFile) -> int:
     Raises:
         CorruptFile: the counter and the stored lengths contradict each other.
     """
-    count = file.counter("complete_frames")
     if file.truncated:
+        count = file.promised("complete_frames")
         return next((k for k in range(count, 0, -1) if _is_sound(file, k - 1)), 0)
+    count = file.counter("complete_frames")
     if count:
         file.records("complete_frames", entries("frames"))
         for entry in entries("frames + 1"):
@@ -46,7 +47,7 @@ def frame_count(file: CheckedFile) -> int:
 def row_count(file: CheckedFile) -> int:
     """Complete rows of the series, counted as :func:`frame_count` does."""
     if file.truncated:
-        count = file.counter("complete_rows")
+        count = file.promised("complete_rows")
         firsts = reversed(range(0, count, ROWS_AT_ONCE))
         ends = ((first, first + _sound_rows(file, first, count)) for first in firsts)
         return next((end for first, end in ends if end > first), 0)
