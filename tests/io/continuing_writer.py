@@ -24,6 +24,13 @@ class _TornWriter(RunFileWriter):
 
     def _put(self, name, index, value) -> None:  # type: ignore[no-untyped-def]
         super()._put(name, index, value)
+        self._die_in_time()
+
+    def _put_rows(self, name, first, last, value) -> None:  # type: ignore[no-untyped-def]
+        super()._put_rows(name, first, last, value)
+        self._die_in_time()
+
+    def _die_in_time(self) -> None:
         _TornWriter.calls -= 1
         if _TornWriter.calls == 0:
             self._file.flush()

@@ -200,3 +200,14 @@ def test_a_forked_child_does_not_release_it(tmp_path: Path) -> None:
             os._exit(1 if RunLock.is_held_here(tmp_path) else 0)
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
         assert lock.path.exists()
+
+
+def test_a_forgotten_lock_is_given_back(tmp_path: Path) -> None:
+    lock = RunLock(tmp_path)
+    lock.acquire()
+    del lock
+    assert not RunLock.is_held_here(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+    code = "import sys; from granufab.io.run_lock import RunLock; x = RunLock(sys.argv[1]); "
+    subprocess.run([sys.executable, "-c", code + "x.acquire()", str(tmp_path)], check=True)
+    assert list(tmp_path.iterdir()) == []

@@ -140,6 +140,7 @@ class CheckedFile:
         self.dimension = self.whole("dimension")
         self.grain_count = self.whole("grain_count")
         size = path.stat().st_size
+        self._size = size
         self.most_records = size // _LEAST_RECORD
         self.truncated = truncated or (unclosed and size < self.counter("file_bytes"))
         if self.truncated and self.version == 1:
@@ -240,7 +241,9 @@ class CheckedFile:
         data = self._dataset(entry)
         if not 0 <= first <= last <= len(data):
             raise self.corrupt(f"{entry.name} holds {len(data)} rows, wanted {first}..{last}")
-        written = data.id.get_storage_size()
+        if first == last:
+            return np.empty((0, *data.shape[1:]), data.dtype)
+        written = min(data.id.get_storage_size(), self._size)
         bytes_ = (last - first) * data.dtype.itemsize * int(np.prod(data.shape[1:]))
         if written and bytes_ > LARGEST_RATIO * written:
             raise self.corrupt(f"{entry.name} declares {bytes_} bytes, {written} are stored")

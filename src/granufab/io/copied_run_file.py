@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
-from numpy.typing import NDArray
+import numpy as np
 
-from granufab.history import SERIES_UNITS
 from granufab.io.checked_hdf5 import CheckedFile
 from granufab.io.frame_reader import read_frame
 from granufab.io.run_counts import row_blocks
 from granufab.io.run_file import RunFileWriter
+from granufab.io.schema import ROW_CHECKSUM, entries
 
 __all__ = ["copy_frames", "copy_rows", "sync_file"]
 
@@ -27,27 +27,17 @@ def copy_frames(file: CheckedFile, writer: RunFileWriter, indices: Iterable[int]
         writer.frame(read_frame(file, index, str(file.path)))
 
 
-def copy_rows(file: CheckedFile, writer: RunFileWriter, count: int) -> int:
-    """Append the sound ones of the first ``count`` rows to another run file.
-
-    Returns:
-        How many there were.
-    """
-    before = writer.row_count
+def copy_rows(file: CheckedFile, writer: RunFileWriter, count: int) -> None:
+    """Append the sound ones of the first ``count`` rows to another run file."""
     for _, _, columns in row_blocks(file, count):
-        for row in _rows(columns):
-            writer.row(row)
-    return writer.row_count - before
+        kept = len(columns.pop("index"))
+        if kept:
+            missing = (entry.name for entry in entries("rows") if entry.name not in columns)
+            blank = {name: np.full(kept, np.nan) for name in missing if name != ROW_CHECKSUM}
+            writer.stored_rows({**columns, **blank})
 
 
 def sync_file(path: Path) -> None:
     """Bring the content of a closed file to the disk."""
     with path.open("rb") as stream:
         os.fsync(stream.fileno())
-
-
-def _rows(columns: dict[str, NDArray]) -> Iterator[dict]:
-    for k in range(len(columns["index"])):
-        row = {name: columns[f"series/{name}"][k] for name in SERIES_UNITS
-               if f"series/{name}" in columns}  # fmt: skip
-        yield {**row, "path": columns["series/path"][k].decode(errors="replace")}

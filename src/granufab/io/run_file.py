@@ -175,14 +175,25 @@ class RunFileWriter:
         values = {f"series/{name}": float(row.get(name, np.nan)) for name in SERIES_UNITS}
         stored = {name: np.array([value]) for name, value in values.items()}
         stored["series/path"] = np.array([_path_name(row.get("path", ""))], f"S{NAME_BYTES}")
+        self.stored_rows(stored)
+
+    def stored_rows(self, columns: Mapping[str, NDArray]) -> None:
+        """Append rows as another run file stores them, and flush them.
+
+        Args:
+            columns: all columns of the series by entry name, each of shape (row_count,).
+        Raises:
+            OSError: they could not be written; the rows before them are safe.
+        """
+        end = self._rows + len(columns["series/path"])
         try:
-            for name, value in stored.items():
-                self._put(name, self._rows, value[0])
-            self._put(ROW_CHECKSUM, self._rows, row_checksums(stored, self._rows)[0])
-            self._commit("complete_rows", self._rows + 1)
+            for name, value in columns.items():
+                self._put_rows(name, self._rows, end, value)
+            self._put_rows(ROW_CHECKSUM, self._rows, end, row_checksums(columns, self._rows))
+            self._commit("complete_rows", end)
         except (OSError, RuntimeError) as error:
             raise self._failed(f"row {self._rows}", error) from None
-        self._rows += 1
+        self._rows = end
 
     def close(self, summary: Mapping[str, Any] | None = None) -> None:
         """Close the file; a summary is stored and marks the run as finished.

@@ -13,6 +13,7 @@ import os
 import platform
 import secrets
 import time
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
@@ -106,7 +107,7 @@ class RunLock:
     def __init__(self, folder: Path | str, *, name: str = LOCK_NAME) -> None:
         self.folder = Path(folder)
         self.path = self.folder / name
-        self._owner: Owner | None = None
+        self._give_back: weakref.finalize | None = None  # also if it is forgotten, and at exit
 
     @classmethod
     def is_held_here(cls, folder: Path | str, *, name: str = LOCK_NAME) -> bool:
@@ -129,19 +130,14 @@ class RunLock:
         except OSError as error:
             reason = error.strerror or str(error)
             raise InvalidSettings(f"{self.path}: cannot be written ({reason})") from None
-        self._owner = owner
-        self._held[self.path.absolute()] = (owner.pid, owner.token)
+        place = self.path.absolute()
+        self._held[place] = (owner.pid, owner.token)
+        self._give_back = weakref.finalize(self, _give_back, place, owner)
 
     def release(self) -> None:
         """Give the lock back; does nothing where this process does not hold it."""
-        owner, self._owner = self._owner, None
-        if owner is None or owner.pid != os.getpid():  # a forked child holds nothing
-            return
-        self._held.pop(self.path.absolute(), None)
-        found = _read(self.path)
-        if found is not None and found.token == owner.token:
-            with suppress(OSError):
-                self.path.unlink(missing_ok=True)
+        if self._give_back is not None:
+            self._give_back()
 
     def __enter__(self) -> Self:
         self.acquire()
@@ -181,6 +177,17 @@ class RunLock:
         if near == (here.host, here.machine, here.namespace):
             return text + "wait for it, stop it, or choose another folder"
         return text + f"if it runs no more, delete {self.path}; else choose another folder"
+
+
+def _give_back(place: Path, owner: Owner) -> None:
+    """Remove the lock of this process."""
+    if owner.pid != os.getpid():  # a forked child holds nothing
+        return
+    RunLock._held.pop(place, None)
+    found = _read(place)
+    if found is not None and found.token == owner.token:
+        with suppress(OSError):
+            place.unlink(missing_ok=True)
 
 
 def _placed(path: Path, owner: Owner) -> bool:

@@ -56,6 +56,9 @@ def close_left_open(path: Path) -> None:
 class UnclosedFile(io.FileIO):
     """A file object for ``h5py.File``; its superblock has no mark and its true length.
 
+    A truncated file seems as long as it was, with zeros where it is cut off: so HDF5 opens what
+    is there, and checksums tell what is not.
+
     Raises:
         OSError: the superblock is damaged.
     """
@@ -63,16 +66,28 @@ class UnclosedFile(io.FileIO):
     def __init__(self, path: Path) -> None:
         super().__init__(path, "rb")
         head = super().read(SUPERBLOCK_BYTES)
-        self._head = _closed(head, self.seek(0, io.SEEK_END))
+        self._size = super().seek(0, io.SEEK_END)
+        if is_truncated(head, self._size) and not is_unclosed(head):
+            self._size = struct.unpack_from("<Q", head, _END)[0]
+        self._head = _closed(head, self._size)
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
+        """Move to a byte, also behind the end of what is there."""
+        if whence == io.SEEK_END:
+            offset, whence = offset + self._size, io.SEEK_SET
+        return super().seek(offset, whence)
 
     def readinto(self, buffer: Any, /) -> int:
         """Read from the current position; the superblock comes out clean."""
         start = self.tell()
+        view = memoryview(buffer).cast("B")
         count = super().readinto(buffer) or 0
+        missing = max(0, min(len(view), self._size - start) - count)
+        view[count : count + missing] = bytes(missing)
         stop = min(start + count, SUPERBLOCK_BYTES)
         if start < stop:
-            memoryview(buffer).cast("B")[: stop - start] = self._head[start:stop]
-        return count
+            view[: stop - start] = self._head[start:stop]
+        return count + missing
 
 
 def _closed(head: bytes, size: int) -> bytes:
