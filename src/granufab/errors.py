@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 __all__ = [
+    "BrokenState",
     "CorruptFile",
     "GranufabError",
     "IncompleteFile",
@@ -41,6 +42,10 @@ class UnknownFormat(GranufabError, ValueError):
 
 class CorruptFile(GranufabError, OSError):
     """A file is truncated or its content contradicts itself."""
+
+
+class BrokenState(GranufabError, RuntimeError):
+    """A step of a simulation left a state that cannot be, or grains that overlap too far."""
 
 
 class IncompleteFile(UserWarning):

@@ -43,7 +43,8 @@ def test_links_and_pictures_exist(page: Path) -> None:
 
 
 def test_every_page_with_an_example_is_run() -> None:
-    elsewhere = {"states", "evolution", "formats"}  # test_page.py of states, test_formats_page.py
+    # test_page.py of states, test_formats_page.py, test_campaigns_page.py
+    elsewhere = {"states", "evolution", "formats", "campaigns"}
     signatures = {"api", "architecture"}
     pages = {page.stem for page in PAGES if "```python" in page.read_text(encoding="utf-8")}
     assert pages == set(RUN_EXAMPLES) | elsewhere | signatures

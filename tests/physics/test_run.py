@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from physics_cases import grains
 
-from granufab.errors import InvalidPacking, InvalidSettings, MissingData, NotConverged
+from granufab.errors import BrokenState, InvalidSettings, MissingData, NotConverged
 from granufab.history import SERIES_UNITS
 from granufab.packing import Cell, Grains, Packing
 from granufab.simulate import (
@@ -155,7 +155,7 @@ def test_grains_that_cross_are_an_error():
     )
     still = Isotropic()
     simulation = Simulation(crossing, still, step=0.7, solver=Solver(stiffness=math.inf))
-    with pytest.raises(InvalidPacking, match="grains 0 and 1 overlap") as failed:
+    with pytest.raises(BrokenState, match="grains 0 and 1 overlap") as failed:
         simulation.step()
     assert "time_step" in str(failed.value)
 

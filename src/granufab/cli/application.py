@@ -23,6 +23,7 @@ from granufab.cli import (
     repair,
     reproduce,
     run,
+    sweep,
 )
 
 __all__ = ["app"]
@@ -37,6 +38,7 @@ app = typer.Typer(
 )
 app.command("new")(new.new)
 app.command("run")(run.run)
+app.command("sweep")(sweep.sweep)
 app.command("reproduce")(reproduce.reproduce)
 app.command("import")(import_data.import_data)
 app.command("export")(export.export)

@@ -20,8 +20,8 @@ def fit_law(
     paths: Sequence[xr.Dataset], domain: AccessibleFit, definition: str, form: Form
 ) -> EvolutionFit:
     """Fit an evolution law to the first stage of some series, with the loading of ``domain``."""
-    from granufab.cli.fit import known_rows
     from granufab.reproduce.recipe import first_stage
+    from granufab.reproduce.series_fit import known_rows
     from granufab.states import fit_evolution
 
     rows = [known_rows(first_stage(path), definition) for path in paths]

@@ -20,9 +20,7 @@ from granufab.errors import GranufabError, MissingData, UnknownFormat
 if TYPE_CHECKING:
     import xarray as xr
 
-    from granufab.states import AccessibleFit
-
-__all__ = ["fit", "fit_series", "known_rows", "read_paths"]
+__all__ = ["fit", "read_paths"]
 
 Method = Literal["critical", "envelope", "lines"]
 Mode = Literal["compression", "extension"]
@@ -66,6 +64,7 @@ def fit(
     """
     from granufab.cli.output import print_json, print_rows
     from granufab.reproduce.report import fit_entry
+    from granufab.reproduce.series_fit import fit_series
 
     check_new(evolution, force)
     paths = read_paths(series, foreign)
@@ -96,33 +95,6 @@ def fit(
     )
     if law is not None:
         print_law(law)
-
-
-def fit_series(
-    paths: Sequence[xr.Dataset],
-    method: Method = "critical",
-    z_definition: str | None = None,
-    *,
-    dimension: int | None = None,
-    mode: Mode | None = None,
-    b: float | None = None,
-) -> tuple[AccessibleFit, str]:
-    """Fit the domain to some series; returns the fit and the definition of z it used.
-
-    What is not given of dimension, mode and b comes from the attributes of the series
-    (:mod:`granufab.reproduce.symmetry`) and the sign of a' on the plateau.
-    """
-    from granufab.reproduce.recipe import first_stage
-    from granufab.reproduce.symmetry import fit_symmetry, series_symmetry
-    from granufab.states import fit_accessible_states
-
-    definition = z_definition or _default_definition(paths)
-    stages = [first_stage(path) for path in paths]
-    rows = [known_rows(stage, definition) for stage in stages]
-    symmetries = [series_symmetry(path).but(dimension=dimension, mode=mode, b=b) for path in paths]
-    options = fit_symmetry(symmetries, stages).options()
-    strain, z, a = ([row[name] for row in rows] for name in ("eps_q", definition, "a"))
-    return fit_accessible_states(strain, z, a, method=method, **options), definition
 
 
 def read_paths(files: Sequence[Path], foreign: ForeignOptions) -> list[xr.Dataset]:
@@ -207,26 +179,3 @@ def _is_series(file: Path, foreign: ForeignOptions) -> bool:
     except UnknownFormat:
         return True
     return False
-
-
-def _default_definition(paths: Sequence[xr.Dataset]) -> str:
-    return "z_backbone" if all("z_backbone" in path for path in paths) else "z"
-
-
-def known_rows(path: xr.Dataset, definition: str) -> dict:
-    """The rows where strain, z and a are known; a is the signed one where the series has it."""
-    import numpy as np
-
-    signed = "a_signed" in path and not bool(path["a_signed"].isnull().all())
-    columns = {"eps_q": "eps_q", definition: definition, "a": "a_signed" if signed else "a"}
-    for name in columns.values():
-        if name not in path:
-            held = ", ".join(str(key) for key in path.data_vars)
-            raise MissingData(f"the series has no column {name}; it holds {held}")
-    table = np.array([path[name].values for name in columns.values()], dtype=float)
-    known = table[:, np.isfinite(table).all(axis=0)]
-    if not known.size:
-        raise MissingData(
-            f"the series has no row where {', '.join(columns.values())} are all known"
-        )
-    return dict(zip(columns, known, strict=True))

@@ -115,8 +115,8 @@ class Drawing:
 
 def _domain(request: Request) -> Any:
     """The fitted domain, or None with a word on standard error where the runs do not give one."""
-    from granufab.cli.fit import fit_series
     from granufab.fabric import with_series
+    from granufab.reproduce.series_fit import fit_series
     from granufab.reproduce.symmetry import described_series
 
     series = [described_series(with_series(run)) for run in request.runs.values()]

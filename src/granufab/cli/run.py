@@ -139,7 +139,7 @@ def _default_folder(case: Path | None, start: list[Path]) -> Path:
 
 
 def _fabric_pairs(case: Case, result: Run) -> list[tuple[str, Any]]:
-    from granufab.cli.fit import fit_series
+    from granufab.reproduce.series_fit import fit_series
     from granufab.reproduce.symmetry import described_series
 
     pairs: list[tuple[str, Any]] = [

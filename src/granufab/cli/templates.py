@@ -1,10 +1,10 @@
-"""The cases that ``granufab new`` prints, one per loading."""
+"""The cases that ``granufab new`` prints, one per loading, and a campaign."""
 
 from __future__ import annotations
 
 from granufab.simulate.settings import Case, Material, Sample, Stage
 
-__all__ = ["TEMPLATES"]
+__all__ = ["SWEEP", "TEMPLATES"]
 
 TEMPLATES: dict[str, Case] = {
     "isotropic": Case(
@@ -34,3 +34,46 @@ TEMPLATES: dict[str, Case] = {
         ),
     ),
 }
+
+SWEEP = """\
+name = "friction"  # name of the campaign
+seeds = 3  # samples of each point, or their seeds: [1, 2, 5]
+
+[case]  # what every case has: sections as in granufab new shear
+# file = "case.toml"  # take them from this file; sections below win over it
+
+[case.sample]
+grain_count = 1000  # number of grains
+
+[[case.path]]
+loading = "constant-mean"  # which cell components are rate- and stress-driven
+strain = 0.3  # deviatoric strain
+
+[[parameter]]  # a list; parameters are combined, each value with each of the others
+key = "material.friction"  # setting of the case that is varied
+values = [0.1, 0.2, 0.4, 0.8]  # its values
+
+[[parameter]]  # a grid: count values from low to high
+key = "path.0.inertial_number"  # of the first stage of the path
+name = "rate"  # column and axis; default the last part of the key
+low = 1e-4
+high = 1e-3
+count = 2
+spacing = "log"  # or linear
+
+# Lists that carry the same word in zip are walked together:
+# [[parameter]]
+# key = "sample.coordination"
+# values = [3.2, 3.9]
+# zip = "start"
+#
+# A range without count is sampled by a Latin hypercube, together with the others like it:
+# [[parameter]]
+# key = "material.restitution"
+# low = 0.0
+# high = 0.9
+#
+# [latin]
+# count = 20  # points
+# seed = 1  # random seed of the hypercube
+"""

@@ -1,7 +1,8 @@
 """How every kernel is compiled.
 
 ``contract`` lets LLVM fuse multiply–add, ``nsz`` and ``nnan`` free the branch-free minimum and
-maximum; so no kernel may rely on NaN: states are checked for it outside (``simulate.stepping``).
+maximum; so no kernel may rely on NaN: states are checked for it as integers
+(``kernels.outcome``).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How a step ended: stress, numbers that are not finite, the row of the report."""
+"""How a step ended: stress, numbers that cannot be, the row of the report."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from granufab.kernels.step_arrays import (
 )
 from granufab.kernels.tracing import larger, smaller
 
-__all__ = ["finish_step", "inspect", "report_step"]
+__all__ = ["finish_step", "inspect", "measure_stress", "report_step"]
 
 EXPONENT = 0x7FF0000000000000
 
@@ -57,25 +57,50 @@ def _broken(bits):
 
 
 @part
-def inspect(bodies: Bodies, problem: Problem, state: State, notes: Notes, like, piece):
-    """A piece's share of the virial, and its numbers that are not finite."""
-    part = notes.partial[piece]
+def _unfit(sizes):
+    """How many numbers, given as integers, are not finite and positive."""
+    found = 0
+    for i in range(len(sizes)):
+        if sizes[i] <= 0 or sizes[i] >= EXPONENT:
+            found += 1
+    return found
+
+
+@part
+def measure_stress(problem: Problem, state: State, notes: Notes, like, piece):
+    """A piece's share of the virial."""
     reach = piece_of(int(notes.control[COUNT]), piece)
-    virial(problem, state.impulse_n, state.impulse_t, reach, part[4:], like)
+    virial(problem, state.impulse_n, state.impulse_t, reach, notes.partial[piece, 4:], like)
+
+
+@part
+def inspect(bodies: Bodies, notes: Notes, like, piece):
+    """Count a piece's numbers that cannot be: not finite, or R ≤ 0 or m ≤ 0."""
     first, end = piece_of(len(bodies.bits), piece)
-    part[3] = _broken(bodies.bits[first:end])
+    found = _broken(bodies.bits[first:end])
+    first, end = piece_of(len(bodies.places), piece)
+    heavy = len(like) + (1 if len(like) == 2 else 3)
+    found += _broken(bodies.places[first:end]) + _unfit(bodies.sizes[first:end])
+    notes.partial[piece, 3] = found + _unfit(bodies.bits[first:end, heavy])
+
+
+@part
+def _cell_is_broken(box: Box):
+    """Whether a number of the cell or its stress is not finite, or its volume is not positive."""
+    found = _broken(box.bits[MATRIX]) + _broken(box.bits[RATE])
+    found += _broken(box.bits[STRAIN]) + _broken(box.bits[STRESS])
+    return found > 0 or determinant(box.tensors[MATRIX]) <= 0.0
 
 
 @part
 def finish_step(box: Box, notes: Notes, law: StepLaw):
-    """Stress of the step and capped rates; whether a number is not finite."""
+    """Stress of the step and capped rates."""
     tensors, partial, control = box.tensors, notes.partial, notes.control
     dimension = tensors.shape[1]
     scale = 1.0 / (law.step * determinant(tensors[MATRIX]))
-    broken, smallest = float(_broken(box.bits[RATE])), 0.0
+    smallest = 0.0
     for piece in range(PIECES):
         smallest = smaller(smallest, partial[piece, 1])
-        broken += partial[piece, 3]
     control[OVERLAP] = -smallest
     largest = 0.0
     for k in range(dimension):
@@ -91,7 +116,6 @@ def finish_step(box: Box, notes: Notes, law: StepLaw):
                 imposed = tensors[IMPOSED, k, l]
                 free = tensors[RATE, k, l] - imposed
                 tensors[RATE, k, l] = imposed + free * (law.rate_cap / largest)
-    return broken > 0.0
 
 
 @part
@@ -117,6 +141,11 @@ def report_step(box: Box, notes: Notes, law: StepLaw, tolerance):
     control[WALKED] += change
     control[TOTAL] += abs(change)
     if control[WALKED] >= control[WALK_GOAL] or control[TOTAL] >= control[TOTAL_GOAL]:
+        control[STATUS] = STOP
+    broken = 0.0
+    for piece in range(PIECES):
+        broken += notes.partial[piece, 3]
+    if broken > 0.0 or _cell_is_broken(box):
         control[STATUS] = STOP
     missed = law.strict and control[RESIDUAL] > tolerance
     if missed or control[OVERLAP] > law.overlap_limit:

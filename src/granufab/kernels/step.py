@@ -21,7 +21,7 @@ from granufab.kernels.drift import half_drift
 from granufab.kernels.geometry import find_missed, survey
 from granufab.kernels.lanes import WIDTH
 from granufab.kernels.options import part, steady
-from granufab.kernels.outcome import finish_step, inspect, report_step
+from granufab.kernels.outcome import finish_step, inspect, measure_stress, report_step
 from granufab.kernels.pack import pack_chunk
 from granufab.kernels.problem import Problem, State
 from granufab.kernels.release import free_rates, release
@@ -296,17 +296,18 @@ def _store(step: Step, law: StepLaw, like, member, members):
 
 @part
 def _finish(step: Step, law: StepLaw, settings, like, member, members):
-    """Stress, second half drift, report."""
+    """Stress, second half drift, what cannot be, report."""
     notes, counters, box = step.notes, step.work.counters, step.box
     for piece in range(member, PIECES, members):
-        inspect(step.bodies, step.problem, step.state, notes, like, piece)
+        measure_stress(step.problem, step.state, notes, like, piece)
     meet(counters, members)
     if member == 0:
-        broken = finish_step(box, notes, law)
-        if broken:
-            notes.control[STATUS] = STOP
+        finish_step(box, notes, law)
     meet(counters, members)
     half_drift(step.bodies, box, notes, counters, 0.5 * law.step, like, member, members)
+    for piece in range(member, PIECES, members):
+        inspect(step.bodies, notes, like, piece)
+    meet(counters, members)
     if member == 0:
         control = notes.control
         control[PHASE] = DRIFT

@@ -64,7 +64,7 @@ class Bodies(NamedTuple):
         position: [m], shape (N, D).
         radius: [m], shape (N,).
         motion: body records, shape (body_count, 4 or 8).
-        bits: the same memory as integers.
+        bits, places, sizes: the memory of motion, position and radius as integers.
         free: records before the contacts act; start: before gravity acts (with restitution).
         walked: non-affine displacement since the last search [m], shape (N, D).
     """
@@ -73,6 +73,8 @@ class Bodies(NamedTuple):
     radius: np.ndarray
     motion: np.ndarray
     bits: np.ndarray
+    places: np.ndarray
+    sizes: np.ndarray
     free: np.ndarray
     start: np.ndarray
     walked: np.ndarray

@@ -19,6 +19,7 @@ from granufab.plots.homogeneity import homogeneity
 from granufab.plots.mohr import mohr
 from granufab.plots.network import network
 from granufab.plots.network_3d import network_3d
+from granufab.plots.parameters import parameter_curves
 from granufab.plots.path import path
 from granufab.plots.rose import rose
 from granufab.plots.rose_3d import rose_surface
@@ -51,6 +52,7 @@ __all__ = [
     "network_3d",
     "new_figure",
     "occupation",
+    "parameter_curves",
     "path",
     "rose",
     "rose_surface",

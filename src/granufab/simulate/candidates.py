@@ -27,7 +27,10 @@ class Candidates:
         self.grain_count = grain_count
         self.dimension = dimension
         self.tangents = 1 if dimension == 2 else 3
-        self._allocate(np.empty((0, 2), np.int32), np.empty((0, dimension), np.int32))
+        self._clear()
+
+    def _clear(self) -> None:
+        self._allocate(np.empty((0, 2), np.int32), np.empty((0, self.dimension), np.int32))
 
     def _allocate(self, pairs: np.ndarray, images: np.ndarray) -> None:
         count = len(pairs)
@@ -79,8 +82,11 @@ class Candidates:
             run: team that searches, see :func:`granufab.kernels.neighbours.find_pairs`.
         """
         matrix, origin, periodic = cell
+        old_keys, old_n, old_t = self.keys(), self.impulse_n, self.impulse_t
+        known = self.count
+        self._clear()  # not two lists at once: they are large
         pairs, images = find_pairs(
-            position, radius, cell, skin, room=max(2 * self.dimension * len(radius), self.count),
+            position, radius, cell, skin, room=max(2 * self.dimension * len(radius), known),
             run=run,
         )  # fmt: skip
         if not periodic.all():
@@ -92,7 +98,6 @@ class Candidates:
             walls[:, 1] += len(radius)
             pairs = np.concatenate([pairs, walls])
             images = np.concatenate([images, np.zeros((touching, self.dimension), np.int32)])
-        old_keys, old_n, old_t = self.keys(), self.impulse_n, self.impulse_t
         self._allocate(pairs, images)
         self.friction[:] = friction[0]
         self.friction[self.pairs[:, 1] >= self.grain_count] = friction[1]

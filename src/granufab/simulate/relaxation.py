@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from granufab.errors import InvalidPacking, NotConverged
+from granufab.errors import BrokenState, InvalidPacking, NotConverged
 from granufab.fabric.stress import solid_fraction, stress_tensor
 from granufab.fabric.tensors import mean_part
 from granufab.packing import Packing, require
@@ -142,7 +142,7 @@ def relax(
     before = _values(simulation)
     try:
         steps, stages = _stiffen(simulation, before, progress or (lambda text, fraction: None))
-    except InvalidPacking as error:
+    except BrokenState as error:
         raise NotConverged(f"{_restless(simulation, before)} ({error})") from None
     report = simulation.last_report
     return Relaxed(

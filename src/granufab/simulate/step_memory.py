@@ -93,6 +93,7 @@ class StepMemory:
         """Grains and body records, for kernels."""
         return Bodies(
             self.position, self.radius, self.motion, self.motion.view(np.int64),
+            self.position.view(np.int64), self.radius.view(np.int64),
             self.free, self.start, self.walked,
         )  # fmt: skip
 

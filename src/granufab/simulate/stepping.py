@@ -55,7 +55,7 @@ from granufab.simulate.contact_solver import ContactSolver
 from granufab.simulate.loading import Loading
 from granufab.simulate.scales import Scales
 from granufab.simulate.settings import Material, Solver
-from granufab.simulate.step_checks import check_step
+from granufab.simulate.step_checks import check_places, check_step
 from granufab.simulate.step_law import problem_law, skin_of, solve_settings, step_law
 from granufab.simulate.step_memory import StageClock, StepMemory
 from granufab.simulate.step_report import StepReport, StepReports
@@ -264,7 +264,7 @@ class Simulation:
         """Advance by ``step_size``.
 
         Raises:
-            InvalidPacking: a state is not finite or grains overlap beyond the limit.
+            BrokenState: a state is not finite or grains overlap beyond the limit.
             NotConverged: the residual was not met and the solver is ``strict``.
         """
         return self.advance(1).last
@@ -279,7 +279,7 @@ class Simulation:
             Reports of the steps made: fewer than ``steps`` where a goal was reached, and after
             some tenths of a second, so that a caller can tell about progress.
         Raises:
-            InvalidPacking, NotConverged: as :meth:`step`; the last step is then the faulty one.
+            BrokenState, NotConverged: as :meth:`step`; the last step is then the faulty one.
         """
         control = self.memory.notes.control
         self._set_watch(watch)
@@ -361,6 +361,7 @@ class Simulation:
     def search(self) -> None:
         """Find the candidate pairs afresh; gaps are measured separately."""
         began = time.perf_counter()
+        check_places(self)
         matrix, origin = self.tensors[MATRIX], self.memory.origin
         shorten_cell(matrix, self.periodic, self.remap, self.candidates.shear_images)
         friction = (self.material.friction, self.material.wall_friction)
@@ -373,8 +374,7 @@ class Simulation:
         self.candidates.divide(solver.chunk, solver.chunk_count)
         self.make_room()
         self.memory.walked[:] = 0.0
-        control = self.memory.notes.control
-        control[STRAIN_WALKED], control[FARTHEST] = 0.0, 0.0
+        self.memory.notes.control[[STRAIN_WALKED, FARTHEST]] = 0.0
         self.searches += 1
         self._clock.seconds["search"] += time.perf_counter() - began
 

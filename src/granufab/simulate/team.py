@@ -15,7 +15,7 @@ from granufab.errors import InvalidSettings
 from granufab.kernels.team import COUNTERS, GIVE_UP
 from granufab.packing import IntArray
 
-__all__ = ["Team", "thread_count"]
+__all__ = ["Team", "core_count", "thread_count"]
 
 
 def thread_count() -> int:
@@ -29,14 +29,17 @@ def thread_count() -> int:
     """
     given = os.environ.get("GRANUFAB_THREADS")
     if not given:
-        if os.name != "posix":
-            return 1
-        usable = getattr(os, "sched_getaffinity", None)
-        count = len(usable(0)) if usable else os.cpu_count() or 1
-        return max(1, min(count, _quota()))
+        return core_count() if os.name == "posix" else 1
     if not given.isdecimal() or int(given) < 1:
         raise InvalidSettings(f"GRANUFAB_THREADS is {given!r}, must be an integer ≥ 1")
     return int(given)
+
+
+def core_count() -> int:
+    """Processors that this process may use: of the machine, its affinity, its container."""
+    usable = getattr(os, "sched_getaffinity", None)
+    count = len(usable(0)) if usable else os.cpu_count() or 1
+    return max(1, min(count, _quota()))
 
 
 def _quota() -> int:
