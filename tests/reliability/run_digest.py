@@ -1,4 +1,4 @@
-"""What two runs with the same bits have in common."""
+"""What two runs must have in common to count as the same."""
 
 from __future__ import annotations
 

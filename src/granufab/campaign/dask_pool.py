@@ -17,7 +17,7 @@ from granufab.campaign.local_pool import MOST_DEATHS, PATIENCE
 from granufab.errors import GranufabError, InvalidSettings, MissingData
 from granufab.reproduce.case_folder import RunCase
 
-__all__ = ["QUEUES", "check_dask", "run_dask"]
+__all__ = ["QUEUES", "check_dask", "dask_client", "run_dask"]
 
 QUEUES = {"slurm": "SLURMCluster", "pbs": "PBSCluster", "sge": "SGECluster"}
 """Queues of clusters and their classes in dask-jobqueue."""
@@ -68,7 +68,7 @@ def run_dask(
     check_dask(where)
     if not tasks:
         return
-    with _client(where, workers, tasks[0].threads) as client:
+    with dask_client(where, workers, tasks[0].threads) as client:
         _Campaign(client, tasks, ledger).follow(run_case)
 
 
@@ -82,7 +82,17 @@ def _need(package: str) -> Any:
 
 
 @contextmanager
-def _client(where: str, workers: int, threads: int) -> Iterator[Any]:
+def dask_client(where: str, workers: int, threads: int) -> Iterator[Any]:
+    """A client of Dask workers; those that it starts end with the block.
+
+    Args:
+        where: local, a queue, or the address of a scheduler.
+        workers: processes (local), or jobs of the queue.
+        threads: processors of a job.
+    Raises:
+        MissingData: the extra ``sweep`` is not installed.
+        InvalidSettings: the scheduler cannot be reached, or the queue refuses.
+    """
     distributed = _need("distributed")
     with ExitStack() as stack:
         try:

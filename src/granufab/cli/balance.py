@@ -16,6 +16,7 @@ from granufab.cli.foreign import (
     open_run,
     print_summaries,
 )
+from granufab.cli.frame_sharing import DaskWorkers, Workers, shared_frames
 from granufab.cli.output_files import check_figure, check_table
 from granufab.errors import MissingData
 
@@ -85,6 +86,8 @@ def balance(
         Path | None,
         typer.Option("-o", "--figure", metavar="FILE", help="Draw the terms by direction."),
     ] = None,
+    workers: Workers = 1,
+    dask: DaskWorkers = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that exist.")] = False,
 ) -> None:
     """Count contacts gained, lost and turned between states, by direction (eq. 16).
@@ -100,14 +103,16 @@ def balance(
     check_figure(figure, force)
     opened = open_run(files, foreign)
     run = opened.name
-    table = balance_run(
-        opened.run,
-        every=interval,
-        criterion=criterion,
-        z_definition=z_definition,
-        bins=bins,
-        keep=keep,
-    )
+    with shared_frames(workers, dask) as each:
+        table = balance_run(
+            opened.run,
+            every=interval,
+            criterion=criterion,
+            z_definition=z_definition,
+            bins=bins,
+            keep=keep,
+            each=each,
+        )
     numbers = np.array(frame_numbers(opened.run))
     for end in ("frame_before", "frame_after"):
         table[end] = table[end].copy(data=numbers[table[end].values])

@@ -19,12 +19,14 @@ from granufab.cli.foreign import (
     open_runs,
     print_summaries,
 )
+from granufab.cli.frame_sharing import DaskWorkers, Workers, shared_frames
 from granufab.cli.output_files import check_table
 from granufab.errors import MissingData
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from granufab.fabric.frame_map import FrameMap
     from granufab.history import Run
 
 __all__ = ["measure"]
@@ -77,6 +79,8 @@ def measure(
     out: Annotated[
         Path | None, typer.Option(metavar="FILE.csv|.nc", help="Also write all values here.")
     ] = None,
+    workers: Workers = 1,
+    dask: DaskWorkers = None,
     force: Annotated[bool, typer.Option("--force", help="Replace --out if it exists.")] = False,
 ) -> None:
     """Measure z, fabric tensors, anisotropy and stress of every recorded state."""
@@ -84,7 +88,8 @@ def measure(
 
     check_table(out, force)
     opened = open_runs(files, foreign)
-    tables = [_measure_run(one, criterion, z_definition, frame, forces) for one in opened]
+    with shared_frames(workers, dask) as each:
+        tables = [_measure_run(one, criterion, z_definition, frame, forces, each) for one in opened]
     print_summaries(opened)
     if out is not None:
         _write(tables, out)
@@ -101,19 +106,27 @@ def measure(
 
 
 def _measure_run(
-    one: Opened, criterion: str | None, z_definition: Any, frame: int | None, forces: bool
+    one: Opened,
+    criterion: str | None,
+    z_definition: Any,
+    frame: int | None,
+    forces: bool,
+    each: FrameMap,
 ) -> xr.Dataset:
     """One row per state, with its source and number."""
     from dataclasses import replace
 
     from granufab.fabric import measure_run
+    from granufab.fabric.frame_map import one_by_one
 
     file, run, numbers = one.name, one.run, ()
     if frame is not None:
         place = frame_place(run, file, frame)
         numbers = frame_numbers(run)[place : place + 1]
-        run = replace(run, frames=[run.frames[place]])
-    table = measure_run(run, criterion=criterion, z_definition=z_definition, forces=forces)
+        run, each = replace(run, frames=[run.frames[place]]), one_by_one
+    table = measure_run(
+        run, criterion=criterion, z_definition=z_definition, forces=forces, each=each
+    )
     if frame is None:
         numbers = frame_numbers(run)
     _explain_unknown(file, run, table)

@@ -16,6 +16,7 @@ from granufab.errors import GranufabError, InvalidSettings
 
 if TYPE_CHECKING:
     from granufab.history import Run
+    from granufab.simulate.available import Room
     from granufab.simulate.settings import Case
 
 __all__ = ["run", "solver_pairs"]
@@ -63,6 +64,10 @@ def run(
         str | None,
         typer.Option(metavar="TIME", help="End with a checkpoint after s, m:s, h:m:s or d-h:m:s."),
     ] = None,
+    dry_run: Annotated[
+        bool,
+        typer.Option("--dry-run", help="Only tell what the run needs, and whether it fits."),
+    ] = False,
 ) -> None:
     """Simulate a case; writes run.h5, settings.toml, series.csv and summary.json."""
     from granufab.cli.output import print_pairs
@@ -72,6 +77,9 @@ def run(
     overrides = (*(set_ or ()), *(() if seed is None else (f"sample.seed={seed}",)))
     settings = _settings(case, start or [], foreign, overrides)
     folder = out or _default_folder(case, start or [])
+    if dry_run:
+        print_pairs(settings.name, _needs(settings, folder))
+        return
     with show_progress(gentle=True) as progress:
         result = run_into_folder(
             settings,
@@ -92,6 +100,40 @@ def run(
         if "stopped_by" in result.summary:
             print("granufab: --max-walltime is over; go on with --resume", file=sys.stderr)
         raise KeyboardInterrupt
+
+
+def _needs(case: Case, folder: Path) -> list[tuple[str, Any]]:
+    """What a run would need, as far as its settings tell, and what there is."""
+    from granufab.reproduce.preflight import check_fits, disk_available, in_words
+    from granufab.reproduce.start_state import with_start_size
+    from granufab.simulate.available import memory_available
+
+    case = with_start_size(case)
+    needs = check_fits(case, folder)
+    memory, disk = memory_available(), disk_available(folder)
+    return [
+        ("grains", case.sample.grain_count),
+        ("steps", needs.steps),
+        ("frames", needs.frames),
+        ("rows of the series", needs.rows),
+        ("memory", f"about {in_words(needs.memory)}{_there(memory)}"),
+        ("disk", f"about {in_words(needs.disk)}{_there(disk)}"),
+        ("time", f"about {_time(needs.seconds)} on one processor, a guess"),
+        ("files in", folder),
+    ]
+
+
+def _there(room: Room | None) -> str:
+    from granufab.reproduce.preflight import in_words
+
+    return "" if room is None else f", there are {in_words(room.size)} ({room.source})"
+
+
+def _time(seconds: float) -> str:
+    for unit, size in (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.2g} s"
 
 
 def _seconds(text: str | None) -> float:

@@ -21,7 +21,8 @@ from granufab.fabric.forces import force_statistics
 from granufab.fabric.frame_series import frame_series, with_series
 from granufab.fabric.harmonics import real_harmonics, sphere_density, sphere_orientation
 from granufab.fabric.homogeneity import homogeneity, local_strain
-from granufab.fabric.measure import measure, measure_run, quick_measure
+from granufab.fabric.measure import measure, quick_measure
+from granufab.fabric.measure_run import measure_run
 from granufab.fabric.neighbours import branch_vectors, neighbours_within
 from granufab.fabric.network import Network, select_network
 from granufab.fabric.orientation import orientation, symmetry_axis

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,15 +21,18 @@ from granufab.fabric.balance import (
 from granufab.fabric.contact_identity import (
     ContactRule,
     IdentifiedContacts,
-    follow_contacts,
+    SeenContacts,
+    follow_seen,
+    see_contacts,
 )
 from granufab.fabric.coordination import ZDefinition, check_definition
 from granufab.fabric.criterion import Criterion
 from granufab.fabric.direction_bins import DirectionBins
+from granufab.fabric.frame_map import FrameMap, one_by_one
 from granufab.fabric.lattice import lattice_change
 from granufab.fabric.run_definitions import recorded_reach, run_definitions
-from granufab.history import Run
-from granufab.packing import Array, IntArray, Packing
+from granufab.history import Frame, Run
+from granufab.packing import Array, IntArray
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,22 +89,7 @@ class FollowedRun:
             InvalidSettings: ``every`` is below 1.
             MissingData: no stage is long enough.
         """
-        if every < 1:
-            raise InvalidSettings(f"an interval must be at least 1 frame, got {every}")
-        stages = np.asarray(self.stage)
-        starts = [0, *(np.flatnonzero(np.diff(stages))).tolist(), len(stages) - 1]
-        found = [
-            (first, first + every)
-            for low, high in pairwise(starts)
-            for first in range(low, high - every + 1, every)
-        ]
-        if not found:
-            longest = max(high - low for low, high in pairwise(starts))
-            raise MissingData(
-                f"run {self.name!r} has no interval of {every} frames within a stage; its longest "
-                f"stage has {longest}"
-            )
-        return found
+        return _intervals(self.stage, every, self.name)
 
 
 def balance_run(
@@ -113,6 +102,7 @@ def balance_run(
     direction: Array | None = None,
     keep: float | None = None,
     minimum: int = 2,
+    each: FrameMap = one_by_one,
 ) -> xr.Dataset:
     """The balance of every interval of a run, with rates per grain and unit strain.
 
@@ -129,6 +119,9 @@ def balance_run(
         direction: where θ starts, shape (D,); default the run's first contraction axis.
         keep: as for :func:`~granufab.fabric.balance`, from frame to frame.
         minimum: fewest contacts that hold a grain.
+        each: finds the contacts of every frame, one by one or in several processes
+            (:func:`granufab.campaign.frame_workers`); contacts of no more than an interval's ends
+            and of the frames that it works on are held.
     Returns:
         Variables of :func:`~granufab.fabric.balance` over ``interval``; eps_q_before, eps_q,
         eps_q_total_before, eps_q_total, strain, stage, frame_before, frame_after of each;
@@ -139,10 +132,19 @@ def balance_run(
         MissingData: no stage has ``every`` + 1 frames, or a frame lacks what is needed.
         InvalidSettings: ``every`` is below 1, or as for :func:`~granufab.fabric.balance`.
     """
-    followed = follow_run(
-        run, criterion=criterion, z_definition=z_definition, keep=keep, minimum=minimum
-    )
-    return balance_intervals(followed, every=every, bins=bins, direction=direction)
+    _check_interval(every)
+    rule = _rule(run, criterion, z_definition, keep, minimum)
+    first = run.frames[0]
+    axis = first.direction if direction is None else direction
+    chosen = DirectionBins.of(axis, bins, first.packing.dimension)
+    grain_count = first.packing.grains.count
+    del first
+    places: list[_Place] = []
+    stream = follow_seen(_seen(run, rule, places, each), rule)
+    rows = [count_balance(*ends, chosen) for ends in _ends(stream, places, every)]
+    intervals = _intervals([place.stage for place in places], every, run.name)
+    counts = _Counts(rows, intervals, places, grain_count)
+    return _dataset(counts, chosen, rule, run.name, every)
 
 
 def follow_run(
@@ -165,22 +167,10 @@ def follow_run(
         MissingData: the run has no frames, or a frame lacks what the criterion needs.
         InvalidSettings: an unknown criterion or definition, or a bad ``keep``.
     """
-    rule = ContactRule(
-        criterion=run_definitions(run, criterion)[0],
-        keep=keep,
-        z_definition=check_definition(z_definition),
-        minimum=minimum,
-        reach=recorded_reach(run),
-    )
-    place: list[tuple[float, float, int]] = []
-
-    def states() -> Iterator[tuple[Packing, IntArray]]:
-        for frame in run.frames:
-            place.append((frame.eps_q, frame.eps_q_total, frame.stage))
-            yield frame.packing, lattice_change(frame)
-
-    contacts = list(follow_contacts(states(), rule))
-    eps_q, eps_q_total, stage = zip(*place, strict=True)
+    rule = _rule(run, criterion, z_definition, keep, minimum)
+    places: list[_Place] = []
+    contacts = list(follow_seen(_seen(run, rule, places, one_by_one), rule))
+    eps_q, eps_q_total, stage = zip(*places, strict=True)
     return FollowedRun(
         contacts=contacts,
         eps_q=eps_q,
@@ -201,9 +191,6 @@ def balance_intervals(
         MissingData: no stage has ``every`` + 1 frames.
         InvalidSettings: ``every`` is below 1, or bad bins or direction.
     """
-
-    import xarray as xr  # slow to import: only where a Dataset is made
-
     first = followed.contacts[0]
     chosen = DirectionBins.of(
         followed.direction if direction is None else direction, bins, first.normal.shape[1]
@@ -213,28 +200,124 @@ def balance_intervals(
         count_balance(followed.contacts[low], followed.contacts[high], chosen)
         for low, high in intervals
     ]
-    data = {
-        name: balance_item(name, [row[name] for row in rows], over="interval") for name in rows[0]
-    }
-    data |= _places(followed, intervals)
-    dataset = xr.Dataset(data, coords=balance_coordinates(chosen))
-    dataset = dataset.assign(_rates(dataset, first.grain_count, chosen))
-    attributes = balance_attributes(followed.rule, chosen, first.grain_count)
-    return dataset.assign_attrs(
-        attributes, path=followed.name, interval_frames=every, error_bars=_ERRORS
+    places = list(map(_Place, followed.eps_q, followed.eps_q_total, followed.stage))
+    counts = _Counts(rows, intervals, places, first.grain_count)
+    return _dataset(counts, chosen, followed.rule, followed.name, every)
+
+
+class _Place(NamedTuple):
+    """Where a frame lies on the path."""
+
+    eps_q: float
+    eps_q_total: float
+    stage: int
+
+
+class _Counts(NamedTuple):
+    """What was counted: a row for every interval, and the place of every frame."""
+
+    rows: Sequence[Mapping[str, Any]]
+    intervals: Sequence[tuple[int, int]]
+    places: Sequence[_Place]
+    grain_count: int
+
+
+def _rule(
+    run: Run,
+    criterion: str | Criterion | None,
+    z_definition: ZDefinition,
+    keep: float | None,
+    minimum: int,
+) -> ContactRule:
+    return ContactRule(
+        criterion=run_definitions(run, criterion)[0],
+        keep=keep,
+        z_definition=check_definition(z_definition),
+        minimum=minimum,
+        reach=recorded_reach(run),
     )
 
 
-def _places(followed: FollowedRun, intervals: Sequence[tuple[int, int]]) -> dict[str, tuple]:
-    low, high = np.array(intervals).T
-    eps_q, total = np.array(followed.eps_q), np.array(followed.eps_q_total)
+def _see(frame: Frame, *, rule: ContactRule) -> tuple[_Place, SeenContacts]:
+    """All that the balance needs of one frame."""
+    place = _Place(frame.eps_q, frame.eps_q_total, frame.stage)
+    return place, see_contacts(frame.packing, lattice_change(frame), rule)
+
+
+def _seen(
+    run: Run, rule: ContactRule, places: list[_Place], each: FrameMap
+) -> Iterator[SeenContacts]:
+    """Contacts of every frame; its place is added to ``places``."""
+    for place, seen in each(partial(_see, rule=rule), run.frames):
+        places.append(place)
+        yield seen
+
+
+def _ends(
+    stream: Iterable[IdentifiedContacts], places: Sequence[_Place], every: int
+) -> Iterator[tuple[IdentifiedContacts, IdentifiedContacts]]:
+    """Contacts at both ends of the intervals that :func:`_intervals` lists, as they come."""
+    begun, start = 0, None
+    before: IdentifiedContacts | None = None
+    for index, contacts in enumerate(stream):
+        if start is None:
+            start = contacts
+        elif places[index].stage != places[index - 1].stage:
+            begun, start = index - 1, before
+        if start is not None and index - begun == every:
+            yield start, contacts
+            begun, start = index, contacts
+        before = contacts
+
+
+def _check_interval(every: int) -> None:
+    if every < 1:
+        raise InvalidSettings(f"an interval must be at least 1 frame, got {every}")
+
+
+def _intervals(stage: Sequence[int], every: int, name: str) -> list[tuple[int, int]]:
+    """First and last frame of each interval, within stages."""
+    _check_interval(every)
+    stages = np.asarray(stage)
+    starts = [0, *(np.flatnonzero(np.diff(stages))).tolist(), len(stages) - 1]
+    found = [
+        (first, first + every)
+        for low, high in pairwise(starts)
+        for first in range(low, high - every + 1, every)
+    ]
+    if not found:
+        longest = max(high - low for low, high in pairwise(starts))
+        raise MissingData(
+            f"run {name!r} has no interval of {every} frames within a stage; its longest "
+            f"stage has {longest}"
+        )
+    return found
+
+
+def _dataset(
+    counts: _Counts, bins: DirectionBins, rule: ContactRule, name: str, every: int
+) -> xr.Dataset:
+    import xarray as xr  # slow to import: only where a Dataset is made
+
+    rows = counts.rows
+    data = {key: balance_item(key, [row[key] for row in rows], over="interval") for key in rows[0]}
+    data |= _places(counts)
+    dataset = xr.Dataset(data, coords=balance_coordinates(bins))
+    dataset = dataset.assign(_rates(dataset, counts.grain_count, bins))
+    attributes = balance_attributes(rule, bins, counts.grain_count)
+    return dataset.assign_attrs(attributes, path=name, interval_frames=every, error_bars=_ERRORS)
+
+
+def _places(counts: _Counts) -> dict[str, tuple]:
+    low, high = np.array(counts.intervals).T
+    eps_q, total, stage = (np.array(column) for column in zip(*counts.places, strict=True))
     columns = {
         "eps_q_before": eps_q[low],
         "eps_q": eps_q[high],
         "eps_q_total_before": total[low],
         "eps_q_total": total[high],
         "strain": total[high] - total[low],
-        "stage": np.array(followed.stage)[high],
+        "stage": stage[high],
         "frame_before": low,
         "frame_after": high,
     }

@@ -26,9 +26,12 @@ from granufab.packing import Array, Contacts, IntArray, Packing
 __all__ = [
     "ContactRule",
     "IdentifiedContacts",
+    "SeenContacts",
     "follow_contacts",
+    "follow_seen",
     "identify",
     "persistent",
+    "see_contacts",
 ]
 
 _ALONG = 1e-9
@@ -113,6 +116,21 @@ class IdentifiedContacts:
         return IdentifiedContacts(
             key=key, pair=pair, normal=normal, number=self.number, lattice=self.lattice
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SeenContacts:
+    """Contacts of one state.
+
+    Attributes:
+        made: by the criterion.
+        near: pairs within the gap that keeps a contact, or None without one.
+        support: wall contacts of each grain, shape (grain_count,), or None.
+    """
+
+    made: IdentifiedContacts
+    near: IdentifiedContacts | None
+    support: IntArray | None
 
 
 def identify(packing: Packing, contacts: Contacts, change: IntArray) -> IdentifiedContacts:
@@ -249,24 +267,41 @@ def follow_contacts(
         MissingData: a state lacks what the criterion needs.
         InvalidPacking: as for :func:`identify`.
     """
+    return follow_seen((see_contacts(*state, rule) for state in states), rule)
+
+
+def see_contacts(packing: Packing, change: IntArray, rule: ContactRule) -> SeenContacts:
+    """What one state tells, whatever was before: states can be read in any order.
+
+    Raises:
+        MissingData, InvalidPacking: as for :func:`follow_contacts`.
+    """
+    made = identify(packing, select_contacts(packing, rule.criterion, reach=rule.reach), change)
+    near = None
+    if rule.keep is not None:
+        pairs = select_contacts(packing, Criterion("gap", rule.keep), reach=rule.reach)
+        near = identify(packing, pairs, change)
+    counts_all = rule.z_definition == "z"
+    support = None if counts_all else wall_support(packing, rule.criterion, reach=rule.reach)
+    return SeenContacts(made=made, near=near, support=support)
+
+
+def follow_seen(states: Iterable[SeenContacts], rule: ContactRule) -> Iterator[IdentifiedContacts]:
+    """Contacts of successive states, of which each was seen alone."""
     known: IdentifiedContacts | None = None
-    for packing, change in states:
-        made = select_contacts(packing, rule.criterion, reach=rule.reach)
-        held = identify(packing, made, change)
-        if rule.keep is not None and known is not None:
-            near = select_contacts(packing, Criterion("gap", rule.keep), reach=rule.reach)
-            close = identify(packing, near, change)
-            held = held.join(close.select(persistent(known, close)[1]))
+    for seen in states:
+        held = seen.made
+        if seen.near is not None and known is not None:
+            held = held.join(seen.near.select(persistent(known, seen.near)[1]))
         known = held
-        yield _counted(packing, held, rule)
+        yield _counted(held, seen.support, rule)
 
 
 def _counted(
-    packing: Packing, contacts: IdentifiedContacts, rule: ContactRule
+    contacts: IdentifiedContacts, support: IntArray | None, rule: ContactRule
 ) -> IdentifiedContacts:
     if rule.z_definition == "z":
         return contacts
-    support = wall_support(packing, rule.criterion, reach=rule.reach)
     numbers = coordination(
         contacts.pair, contacts.grain_count, minimum=rule.minimum, support=support
     )

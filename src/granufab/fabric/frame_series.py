@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from granufab.fabric.measure import measure_run
+from granufab.fabric.measure_run import measure_run
 from granufab.history import SERIES_UNITS, Run, series_dataset
 
 if TYPE_CHECKING:

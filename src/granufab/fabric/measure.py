@@ -17,10 +17,9 @@ from granufab.fabric.coordination import (
     counted_contacts,
 )
 from granufab.fabric.criterion import Criterion, force_threshold, mean_diameter, parse_criterion
-from granufab.fabric.force_values import FORCE_VALUES, force_values
+from granufab.fabric.force_values import FORCE_VALUES
 from granufab.fabric.neighbours import branch_vectors, neighbours_within
 from granufab.fabric.network import Network, select_network
-from granufab.fabric.run_definitions import recorded_reach, run_definitions, run_friction
 from granufab.fabric.stress import solid_fraction, stress_ratio, stress_tensor
 from granufab.fabric.tensors import (
     anisotropy,
@@ -36,13 +35,13 @@ from granufab.fabric.tensors import (
     principal_values,
     signed_anisotropy,
 )
-from granufab.history import SERIES_UNITS, Frame, Run
+from granufab.history import SERIES_UNITS
 from granufab.packing import Array, IntArray, Packing
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["measure", "measure_run", "quick_measure", "values_dataset"]
+__all__ = ["Value", "measure", "quick_measure", "values_dataset"]
 
 Value = float | str | None
 
@@ -134,61 +133,6 @@ def measure(
         "z_definition": definition,
         "missing": "; ".join(reasons) or None,
     }
-
-
-def measure_run(
-    run: Run,
-    *,
-    criterion: str | Criterion | None = None,
-    z_definition: ZDefinition | None = None,
-    direction: Array | None = None,
-    minimum: int | None = None,
-    bootstrap: int = 0,
-    forces: bool = False,
-) -> xr.Dataset:
-    """All values of :func:`measure` for every recorded frame of a run.
-
-    Args:
-        run: frames with contacts.
-        criterion: default the run's own, else ``force``.
-        z_definition: default the run's own, else ``z_backbone``.
-        direction: axis of a', shape (D,); default each frame's contraction axis.
-        minimum: fewest contacts that hold a grain; default the run's own rule, D + 1 where its
-            grains have no friction, else 2.
-        bootstrap: number of resampled states a frame for standard errors.
-        forces: add the values of :func:`~granufab.fabric.force_values`, with the run's friction.
-    Returns:
-        Variables over ``frame``, NaN where unknown, with eps_q, eps_q_total, stage, residual,
-        sweeps and inertial_number of the frame; units, long_name and the definitions in attrs.
-    Raises:
-        MissingData: the run has no frames, or a frame holds nothing to measure.
-        InvalidSettings: an unknown criterion or definition.
-    """
-    rule, definition, fewest = run_definitions(run, criterion, z_definition, minimum)
-    rows = []
-    for frame in run.frames:
-        row = measure(
-            frame.packing,
-            criterion=rule,
-            z_definition=definition,
-            direction=frame.direction if direction is None else direction,
-            minor=frame.extension if direction is None else None,
-            minimum=fewest,
-            reach=recorded_reach(run),
-            bootstrap=bootstrap,
-        )
-        if forces:
-            row |= _force_row(frame, run, rule, definition, fewest, direction)
-        rows.append(row | _frame_values(frame))
-        del frame  # before the next one is read
-    attributes = {
-        "path": run.name,
-        "criterion": rule.text,
-        "z_definition": definition,
-        "minimum_contacts": fewest,
-        "dimension": run.dimension,
-    }
-    return values_dataset(rows, "frame", attributes)
 
 
 def quick_measure(
@@ -329,41 +273,6 @@ def _errors(
         minimum=minimum, reach=reach, replicas=replicas,
     )  # fmt: skip
     return {f"{name}_error": value for name, value in errors.items()}
-
-
-def _frame_values(frame: Frame) -> dict[str, float]:
-    return {
-        "eps_q": frame.eps_q,
-        "eps_q_total": frame.eps_q_total,
-        "stage": float(frame.stage),
-        "residual": frame.statistics.residual,
-        "sweeps": frame.statistics.sweeps,
-        "inertial_number": frame.inertial_number,
-    }
-
-
-def _force_row(
-    frame: Frame,
-    run: Run,
-    rule: Criterion,
-    definition: ZDefinition,
-    fewest: int,
-    direction: Array | None,
-) -> dict[str, Value]:
-    """Values of the forces; None throughout where the frame does not tell."""
-    try:
-        return dict(
-            force_values(
-                frame,
-                friction=run_friction(run),
-                criterion=rule,
-                z_definition=definition,
-                minimum=fewest,
-                axis=direction,
-            )
-        )
-    except MissingData:
-        return dict.fromkeys(FORCE_VALUES)
 
 
 def _check_direction(direction: Array | None, dimension: int) -> Array | None:

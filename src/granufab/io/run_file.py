@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from granufab.errors import InvalidPacking, InvalidSettings
 from granufab.history import SERIES_UNITS, Frame
+from granufab.io.abandoned_hdf5 import give_up, reason_of
 from granufab.io.provenance import provenance as collect_provenance
 from granufab.io.run_file_checksum import frame_checksum, row_checksums, text_checksum
 from granufab.io.run_file_layout import RAGGED, create_file, growing, number
@@ -148,12 +149,13 @@ class RunFileWriter:
                 dimension, radius, mass or identity.
             OSError: it could not be written; the frames before it are safe.
         """
+        self._check_open(f"frame {self._frames}")
         grains = frame.packing.grains
-        if self._first is None:
-            self._start(grains)
-        else:
+        if self._first is not None:
             self._check_same_grains(self._first, grains)
         try:
+            if self._first is None:
+                self._start(grains)
             self._append_frame(stored_frame(frame))
             self._commit("complete_frames", self._frames + 1)
         except (OSError, RuntimeError) as error:
@@ -172,6 +174,7 @@ class RunFileWriter:
             raise InvalidSettings(
                 f"unknown series column {min(unknown)} (known: path, {', '.join(SERIES_UNITS)})"
             )
+        self._check_open(f"row {self._rows}")
         values = {f"series/{name}": float(row.get(name, np.nan)) for name in SERIES_UNITS}
         stored = {name: np.array([value]) for name, value in values.items()}
         stored["series/path"] = np.array([_path_name(row.get("path", ""))], f"S{NAME_BYTES}")
@@ -200,6 +203,8 @@ class RunFileWriter:
 
         Args:
             summary: plain data; NaN and ±∞ become null.
+        Raises:
+            OSError: it could not be written; frames and rows are safe.
         """
         if not self._file:
             return
@@ -212,11 +217,12 @@ class RunFileWriter:
                 checksum = text_checksum(self._frames, self._rows, text)
                 self._counters["summary_checksum"][()] = np.uint64(checksum)
                 self._commit("finished", 1)
+            self._file.flush()
+            self._file.close()
+        except (OSError, RuntimeError) as error:
+            raise self._failed("the end of the file", error) from None
         finally:
-            try:
-                self._file.close()
-            finally:
-                self._release()
+            self._release()
 
     def _begin(self, path: Path, texts: Mapping[str, str], force: bool) -> None:
         self.path = path
@@ -242,8 +248,10 @@ class RunFileWriter:
             growth = entries("rows", "bytes")
             self._data: dict[str, Any] = {e.name: growing(self._file, e, 0, 1024) for e in growth}
             self._file.flush()
-        except BaseException:
+        except BaseException as error:
             self._release()
+            if isinstance(error, OSError | RuntimeError) and hasattr(self, "_file"):
+                raise self._failed("its head", error) from None
             raise
 
     def _resume(self, frames: int, rows: int) -> None:
@@ -323,10 +331,15 @@ class RunFileWriter:
         if self._lock is not None:
             self._lock.release()
 
+    def _check_open(self, what: str) -> None:
+        """Refuse to write on after a failure, which has closed the file."""
+        if not self._file:
+            raise OSError(f"{self.path}: {what} cannot be written, the file was closed")
+
     def _failed(self, what: str, error: Exception) -> OSError:
-        reason = str(error).splitlines()[0]
+        give_up(self._file)
         return OSError(
-            f"{self.path}: {what} could not be written ({reason}); "
+            f"{self.path}: {what} could not be written ({reason_of(error)}); "
             f"{self._frames} frames and {self._rows} rows before it are safe"
         )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -14,6 +15,8 @@ from typing import Any
 import numpy as np
 
 from granufab.errors import InvalidSettings
+
+_FULL = {getattr(errno, name, -1) for name in ("ENOSPC", "EFBIG", "EDQUOT", "EIO")}
 
 __all__ = ["json_text", "plain", "replacing", "write_json", "write_text"]
 
@@ -60,6 +63,7 @@ def replacing(path: Path | str) -> Iterator[Path]:
 
     Raises:
         InvalidSettings: the folder or the file cannot be written.
+        OSError: the disk is full or fails.
     """
     path = Path(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.tmp")
@@ -71,6 +75,8 @@ def replacing(path: Path | str) -> Iterator[Path]:
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
+        if error.errno in _FULL:
+            raise OSError(error.errno, f"cannot be written ({error.strerror})", str(path)) from None
         raise InvalidSettings(
             f"{path}: cannot be written ({error.strerror or error}); name another folder or file"
         ) from None

@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from granufab.errors import GranufabError, InvalidSettings
+from granufab.errors import BrokenState, GranufabError, InvalidSettings, NotConverged
 from granufab.history import Run
 from granufab.io import (
     Checkpoint,
@@ -31,6 +31,7 @@ from granufab.reproduce.checkpoints import (
     forget_checkpoints,
     held_checkpoint,
 )
+from granufab.reproduce.preflight import check_fits
 from granufab.reproduce.start_state import find_start
 from granufab.simulate.settings import Case, load_case, parse_case, to_toml
 
@@ -82,8 +83,8 @@ def run_into_folder(
     Returns:
         The run, as recorded.
     Raises:
-        InvalidSettings: the folder holds a run already, another process uses it, or it cannot be
-            written; nothing was computed or touched.
+        InvalidSettings: the folder holds a run already, another process uses it, it cannot be
+            written, or memory or disk do not suffice; nothing was computed or touched.
         GranufabError: ``sample.file`` cannot be read, or does not fit the case.
     """
     folder = Path(folder)
@@ -131,6 +132,7 @@ class _Job:
         if start is None and case.sample.file is not None:
             found = find_start(case, self.folder, self.tell)
             case, start, summary = found.case, found.packing, found.summary
+        check_fits(case, self.folder, prepared=start is not None)
         for name in RUN_FILES:
             (self.folder / name).unlink(missing_ok=True)
         forget_checkpoints(self.folder)
@@ -149,8 +151,9 @@ class _Job:
     def go_on(self, held: Checkpoint) -> Run:
         """From a checkpoint."""
         frames, rows = held.notes["frames"], held.notes["rows"]
-        writer = RunFileWriter.continued(self.folder / "run.h5", frames=frames, rows=rows)
         case = parse_case(held.notes["resolved"], where=str(self.folder / CHECKPOINT))
+        check_fits(case, self.folder, prepared=True, frames=frames)
+        writer = RunFileWriter.continued(self.folder / "run.h5", frames=frames, rows=rows)
         notes = {**held.notes, "engine": self.engine, "resumed": held.notes.get("resumed", 0) + 1}
         notes["warnings"] = [*notes.get("warnings", []), *([held.warning] if held.warning else [])]
         return self._run(case, writer, notes, held.arrays, {})
@@ -190,10 +193,13 @@ class _Job:
                 run = self.simulate(case, record=writer, progress=self.tell, **given)
                 run = replace(run, summary=_with_notes(run.summary, notes, checkpoints))
                 writer.close(None if run.summary.get("interrupted") else run.summary)
-        except BaseException:
+        except BaseException as error:
             if writer.frame_count == 0:  # nothing worth keeping: a rerun needs no force
                 for name in ("run.h5", "settings.toml"):
                     (self.folder / name).unlink(missing_ok=True)
+            elif isinstance(error, BrokenState | NotConverged):
+                held = f"{writer.frame_count} good frames before it are in {writer.path}"
+                raise type(error)(f"{error}; {held}") from None
             raise
         return _left(case, self.folder, run)
 

@@ -70,8 +70,12 @@ class Checkpoints:
         Raises:
             OSError: it could not be written; the one before is kept.
         """
-        with self.writer.path.open("rb") as stream:
-            os.fsync(stream.fileno())
+        path = self.writer.path
+        try:
+            with path.open("rb") as stream:
+                os.fsync(stream.fileno())
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(path)) from None
         counts = {"frames": self.writer.frame_count, "rows": self.writer.row_count}
         write_checkpoint(self.folder / CHECKPOINT, arrays, {**self.notes, **counts})
         self._last = time.monotonic()

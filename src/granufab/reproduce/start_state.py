@@ -19,7 +19,7 @@ from granufab.io.foreign_run import SKIPS
 from granufab.packing import Packing
 from granufab.simulate.settings import Case, Reading, parse_case
 
-__all__ = ["Start", "find_start"]
+__all__ = ["Start", "find_start", "with_start_size"]
 
 Progress = Callable[[str, float], None]
 SAME_PRESSURE = 1e-2
@@ -59,7 +59,7 @@ def find_start(case: Case, folder: Path, progress: Progress | None = None) -> St
         GranufabError: as of :func:`granufab.read`.
     """
     sample = case.sample
-    files = (sample.file,) if isinstance(sample.file, str) else tuple(sample.file or ())
+    files = _files(case)
     if not files:
         raise InvalidSettings('sample.file names no file; give file = "run.h5"')
     for file in files:
@@ -82,6 +82,25 @@ def find_start(case: Case, folder: Path, progress: Progress | None = None) -> St
     if foreign:
         packing = _made_hard(case, packing, summary, progress)
     return Start(case=case, packing=packing, summary=summary)
+
+
+def with_start_size(case: Case) -> Case:
+    """A case with dimension, grain count and mean diameter of the state that it starts from.
+
+    Raises:
+        InvalidSettings: the state does not fit the case.
+        GranufabError: as of :func:`granufab.read`.
+    """
+    files = _files(case)
+    if not files:
+        return case
+    packing = _frame(_open(files, case.sample.read), files[0], case.sample.frame)
+    return _for_dimension(case, packing, files[0])
+
+
+def _files(case: Case) -> tuple[str, ...]:
+    file = case.sample.file
+    return (file,) if isinstance(file, str) else tuple(file or ())
 
 
 def _open(files: tuple[str, ...], reading: Reading) -> Run:

@@ -111,7 +111,7 @@ def _lost(s: Simulation) -> NDArray[np.bool_]:
 
 
 def _broken(table: NDArray) -> NDArray[np.bool_]:
-    return np.logical_not(np.isfinite(table).all(axis=1, keepdims=True)[:, 0])
+    return ~np.logical_and.reduce(np.isfinite(table), axis=1)
 
 
 def _grains(s: Simulation, index: NDArray) -> str:

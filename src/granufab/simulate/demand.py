@@ -1,0 +1,100 @@
+"""What a planned run needs: steps, records, memory, disk, time; from its settings alone.
+
+Bytes are measured peaks (docs/reliability.md), rounded up; the time is a rough guess.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from granufab.simulate.settings import Case, Sample, Stage
+
+__all__ = ["Demand", "demand_of", "steps_of_stage"]
+
+FIXED_BYTES = 60e6
+"""Compiled kernels and libraries."""
+GRAIN_BYTES = {2: 1300.0, 3: 3300.0}
+"""Of the engine, its largest moment (a new list of pairs while a frame or checkpoint is held)."""
+PROGRAM_BYTES = {2: 7000.0, 3: 40000.0}
+"""Of the linear programs that bring frictionless samples to rest."""
+PROGRAM_GRAINS = {2: 50_000, 3: 8_000}
+FRAME_BYTES = {2: 200.0, 3: 350.0}
+"""Of a frame in the run file, a grain's share."""
+FRAME_FIXED, ROW_BYTES = 2e4, 200.0
+CHECKPOINT_BYTES = {2: 500.0, 3: 900.0}
+CHECKPOINTS = 3
+"""The present one, the one before, and the one that is written."""
+STEP_SECONDS = {2: 1e-6, 3: 2e-6}
+"""Of a step, a grain's share, on one processor."""
+PREPARATION_SECONDS = {2: 1e-3, 3: 2e-3}
+"""Of the sample, a grain's share."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Demand:
+    """What a run needs.
+
+    Attributes:
+        steps: of the path; stages that come to rest are left out.
+        frames, rows: records at least.
+        memory: more than the process has now [bytes].
+        disk: of the folder [bytes].
+        seconds: about, on one processor [s].
+    """
+
+    steps: int
+    frames: int
+    rows: int
+    memory: int
+    disk: int
+    seconds: float
+
+
+def demand_of(case: Case, *, prepared: bool = False) -> Demand:
+    """What a run of a case needs.
+
+    Args:
+        case: with the grain count, diameter and pressure of its sample.
+        prepared: the sample is there already.
+    """
+    sample, record = case.sample, case.record
+    count, dimension = sample.grain_count, sample.dimension
+    strains = [0.0 if s.loading == "isotropic" else abs(s.strain) for s in case.path]
+    frames = 1 + sum(max(1, math.ceil(e / record.frame_interval - 1e-6)) for e in strains)
+    rows = 1 + sum(max(1, math.ceil(e / record.series_interval - 1e-6)) for e in strains)
+    steps = sum(steps_of_stage(case, stage) for stage in case.path)
+    prepared = prepared or sample.file is not None
+    kept = CHECKPOINTS * CHECKPOINT_BYTES[dimension] * count
+    disk = frames * (FRAME_FIXED + FRAME_BYTES[dimension] * count) + rows * ROW_BYTES + kept
+    seconds = steps * count * STEP_SECONDS[dimension]
+    seconds += 0.0 if prepared else count * PREPARATION_SECONDS[dimension]
+    return Demand(
+        steps=steps,
+        frames=frames,
+        rows=rows,
+        memory=int(FIXED_BYTES + count * _bytes_of_grain(sample, prepared=prepared)),
+        disk=int(disk),
+        seconds=seconds,
+    )
+
+
+def steps_of_stage(case: Case, stage: Stage) -> int:
+    """Steps that walk the strain of a stage, with the default time step at its rate."""
+    if stage.loading == "isotropic":
+        return 0
+    solver, sample = case.solver, case.sample
+    d, dimension = sample.diameter, sample.dimension
+    volume = math.pi * d**dimension / (4 if dimension == 2 else 6)
+    time = math.sqrt(sample.density * volume / sample.pressure / d ** (dimension - 2))
+    inertial = time if dimension == 2 else d * math.sqrt(sample.density / sample.pressure)
+    rate = stage.rate or (stage.inertial_number or 0.0) / inertial
+    return math.ceil(abs(stage.strain) / min(solver.time_step * time * rate, solver.step_strain))
+
+
+def _bytes_of_grain(sample: Sample, *, prepared: bool) -> float:
+    """Of the largest moment: the linear programs where they are used, else the engine."""
+    dimension = sample.dimension
+    smooth = sample.friction == 0 or sample.coordination is not None
+    programs = not prepared and smooth and sample.grain_count <= PROGRAM_GRAINS[dimension]
+    return GRAIN_BYTES[dimension] + (PROGRAM_BYTES[dimension] if programs else 0.0)
