@@ -22,6 +22,7 @@ from granufab.campaign.engine import plan_workers
 from granufab.campaign.expansion import expand
 from granufab.campaign.ledger import read_table
 from granufab.errors import CorruptFile, InvalidSettings
+from granufab.io import RunLock
 from granufab.simulate.team import core_count
 
 TWO = min(2, core_count())
@@ -93,6 +94,7 @@ def test_failed_cases_say_why_and_are_run_again_only_on_request(
     assert len(counted_case.lines("begin")) == 3
 
 
+@pytest.mark.slow
 def test_a_stopped_campaign_goes_on_and_redoes_nothing(
     tmp_path: Path, small: Callable[..., Any]
 ) -> None:
@@ -164,6 +166,28 @@ def test_a_case_is_continued_in_its_folder(
     outcome = do_task(task, lambda text, share: None)
     assert calls == [(member.id, tmp_path, True, "2")]
     assert outcome.state == "interrupted"
+
+
+def test_a_case_that_is_done_is_left_alone_when_it_is_handed_out_again(
+    finished: Path, small: Callable[..., Any]
+) -> None:
+    member = expand(small(0.1, 0.6, seeds=2))[0]
+    folder = finished / "cases" / member.id
+    before = (folder / "run.h5").stat().st_mtime_ns
+    task = Task(id=member.id, case=member.case, folder=folder, start=folder)
+    assert do_task(task, lambda text, share: None, counted_case.counted).state == "done"
+    assert (folder / "run.h5").stat().st_mtime_ns == before
+    assert not counted_case.lines("begin")
+
+
+def test_a_second_campaign_in_the_folder_is_refused(
+    tmp_path: Path, small: Callable[..., Any]
+) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    with RunLock(folder), pytest.raises(InvalidSettings, match=str(os.getpid())):
+        run_campaign(small(0.2), folder)
+    assert not (folder / "cases").exists()
 
 
 @pytest.mark.parametrize(

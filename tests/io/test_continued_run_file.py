@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ import granufab.io as gio
 from granufab.errors import CorruptFile, InvalidPacking, InvalidSettings, MissingData
 from granufab.history import Frame
 from granufab.io import RunFileWriter
+from granufab.io.checked_file import repair_run_file
 from granufab.io.run_lock import RunLock
 
 COUNT = 7
@@ -240,3 +242,59 @@ def _writer(path: Path, kept: int, how: str, calls: int) -> subprocess.Popen[str
         text=True,
         env=environment,
     )
+
+
+@pytest.mark.parametrize("state", ["finished", "left open"])
+def test_a_kill_while_it_is_opened_leaves_the_old_or_the_shortened_file(
+    tmp_path: Path, path_of_frames: Any, monkeypatch: pytest.MonkeyPatch, state: str
+) -> None:
+    """The file as it is on the disk after each step of dropping what is not kept."""
+    path, live = tmp_path / "run.h5", tmp_path / "live.h5"
+    live_writer = RunFileWriter(live, settings={})
+    _write(live_writer, path_of_frames, 0, COUNT)
+    if state == "finished":
+        live_writer.close({"steps": 3})
+    shutil.copy(live, path)
+    live_writer.close()
+    copies: list[Path] = []
+    real = h5py.File.flush
+
+    def copying(file: h5py.File) -> None:
+        real(file)
+        copies.append(Path(shutil.copy(path, tmp_path / f"copy{len(copies)}.h5")))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(h5py.File, "flush", copying)
+        writer = RunFileWriter.continued(path, frames=3, rows=4)
+        patch.undo()
+        writer.close()
+    seen = []
+    for copy in copies:
+        run = gio.read(copy)
+        frames, rows = len(run.frames), run.series.sizes["record"]
+        assert (frames, rows) in ((COUNT, COUNT), (3, COUNT), (3, 4))
+        for index in range(frames):
+            assert_same_frame(run.frames[index], path_of_frames[0][index])
+        assert run.series["z"].values.tolist() == [row["z"] for row in path_of_frames[1][:rows]]
+        seen.append(frames)
+    assert len(copies) == 5 and seen[0] == COUNT and seen[-1] == 3
+    assert seen == sorted(seen, reverse=True)
+
+
+def test_checking_and_copying_hold_a_frame_at_a_time(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    first = random_frame(rng, grain_count=1000, contact_count=2500)
+    base = first.packing.grains
+    peaks = []
+    for count in (2, 16):
+        path = tmp_path / f"{count}.h5"
+        with RunFileWriter(path, settings={}) as writer:
+            for _ in range(count):
+                writer.frame(random_frame(rng, grain_count=1000, contact_count=2500, base=base))
+        tracemalloc.start()
+        try:
+            assert repair_run_file(path, tmp_path / f"new{count}.h5").faults == ()
+            peaks.append(tracemalloc.get_traced_memory()[1])
+        finally:
+            tracemalloc.stop()
+    assert peaks[1] < 1.2 * peaks[0]

@@ -7,6 +7,8 @@ frames or rows are missing without a warning.
 from __future__ import annotations
 
 import shutil
+import subprocess
+import sys
 import time
 import warnings
 from collections import Counter
@@ -24,6 +26,7 @@ from granufab.errors import CorruptFile, GranufabError, IncompleteFile, UnknownF
 from granufab.history import Frame, Run
 from granufab.io import RunFileWriter
 from granufab.io.checked_file import check_file
+from granufab.io.global_heap import heaps_are_sound
 
 LONGEST = 10.0
 
@@ -91,7 +94,7 @@ class Outcomes:
                 self._check(error)
                 outcome = "refused"
         warned = [one for one in shown if issubclass(one.category, IncompleteFile)]
-        assert len(warned) == len(shown)
+        assert len(warned) == len(shown), [str(one.message) for one in shown]
         assert outcome != "shorter" or warned
         assert time.perf_counter() - started < LONGEST
         self.counts[outcome] += 1
@@ -275,3 +278,41 @@ def test_a_checksum_depends_on_each_value(frames: list[Frame]) -> None:
         changed = np.array(value)
         changed.reshape(-1).view(np.uint8)[0] ^= 1
         assert frame_checksum(0, {**values, name: changed}) != right, name
+
+
+def test_long_texts_come_back_and_lie_in_no_heap(tmp_path: Path) -> None:
+    settings = {"name": "x", "note": "µ" * 100_000}
+    path = tmp_path / "run.h5"
+    with RunFileWriter(path, settings=settings) as writer:
+        writer.row({"z": 4.0})
+    assert gio.read(path).settings == settings
+    assert b"GCOL" not in path.read_bytes()
+
+
+READ = "import sys, granufab.io as gio\ntry: gio.read(sys.argv[1])\nexcept OSError: print(1)"
+
+
+@pytest.mark.parametrize("damage", ["longer", "free piece of no length", "cut"])
+def test_a_damaged_heap_of_version_one_does_not_hang(file: Path, damage: str) -> None:
+    """HDF5 alone turns in it without end, so that it is tried in a process that can be ended."""
+    path = file.with_name("heap.h5")
+    shutil.copy(file.with_name("live.h5"), path)
+    make_version_one(path)
+    content = bytearray(path.read_bytes())
+    place = content.index(b"GCOL\x01")
+    size = int.from_bytes(content[place + 8 : place + 16], "little")
+    assert size >= 4096
+    assert heaps_are_sound(path)
+    if damage == "longer":
+        content += bytes(65536)
+        content[place + 8 : place + 16] = (len(content) - place).to_bytes(8, "little")
+    elif damage == "cut":
+        content[place + 8 : place + 16] = (512).to_bytes(8, "little")
+    else:
+        content[place + 16 : place + 32] = bytes(16)
+    path.write_bytes(content)
+    assert not heaps_are_sound(path)
+    done = subprocess.run(
+        [sys.executable, "-c", READ, str(path)], capture_output=True, text=True, timeout=60
+    )
+    assert done.stdout.strip() == "1"

@@ -1,4 +1,4 @@
-"""Turn a run file into one of schema version 1: without checksums."""
+"""Turn a run file into one of schema version 1: no checksums, text of variable length."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import h5py
 
+TEXTS = ("format", "created", "settings", "provenance")
 ADDED = ("frames/checksum", "series/checksum", "summary_checksum")
 
 
@@ -17,3 +18,7 @@ def make_version_one(path: Path) -> None:
                 del file[name]
         del file.attrs["checksum"]
         file.attrs["schema_version"] = 1
+        for name in TEXTS:
+            text = file.attrs[name].decode()
+            del file.attrs[name]
+            file.attrs[name] = text

@@ -109,7 +109,10 @@ def _with_full_disk(case: Path, out: Path, size: int) -> subprocess.CompletedPro
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs RLIMIT_FSIZE")
-@pytest.mark.parametrize("share", [0.35, 0.6, 0.95])
+@pytest.mark.parametrize(
+    "share",
+    [pytest.param(0.35, marks=pytest.mark.slow), 0.6, pytest.param(0.95, marks=pytest.mark.slow)],
+)
 def test_a_full_disk_ends_the_run_in_one_line_and_it_resumes(
     share: float, whole: Path, tmp_path: Path
 ) -> None:

@@ -7,16 +7,15 @@ import os
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
+from granufab.campaign.folder import State, is_finished
+from granufab.campaign.identity import digest_of
 from granufab.errors import GranufabError
 from granufab.history import Run
 from granufab.reproduce.case_folder import Progress, RunCase, run_into_folder
 from granufab.simulate.settings import Case
 
 __all__ = ["Outcome", "Task", "continue_case", "do_task", "tell_now_and_then"]
-
-State = Literal["waiting", "running", "done", "failed", "interrupted"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,13 +60,17 @@ def continue_case(
 
 
 def do_task(task: Task, progress: Progress, run_case: RunCase | None = None) -> Outcome:
-    """Run one case; every failure becomes one line.
+    """Run one case; every failure becomes one line. A case that is done is left alone.
+
+    Dask may hand out a task again although it has ended, when its worker dies with the answer.
 
     Args:
         task: the case.
         progress: told a few times a second; raises KeyboardInterrupt to stop the case.
         run_case: what simulates, see :func:`granufab.reproduce.run_into_folder`.
     """
+    if is_finished(task.folder, digest_of(task.id)):
+        return Outcome(state="done")
     os.environ["GRANUFAB_THREADS"] = str(task.threads)
     began = time.monotonic()
     state: State = "failed"

@@ -6,9 +6,8 @@ import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from granufab.campaign.case_work import State
 from granufab.campaign.expansion import Member
 from granufab.campaign.identity import case_digest
 from granufab.errors import GranufabError, InvalidSettings, MissingData
@@ -16,7 +15,9 @@ from granufab.io import write_json
 from granufab.reproduce.checkpoints import CHECKPOINT
 from granufab.simulate.settings import load_case
 
-__all__ = ["CampaignFolder", "is_finished", "seconds_of_run", "state_of_folder"]
+__all__ = ["CampaignFolder", "State", "is_finished", "seconds_of_run", "state_of_folder"]
+
+State = Literal["waiting", "running", "done", "failed", "interrupted"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,13 +20,15 @@ _FOUND = ("dimension", "grain_count", "diameter", "pressure")
 def case_digest(case: Case) -> str:
     """Hash of the resolved settings of a case, its name apart.
 
+    Settings at their defaults are left out, so that a later version with more settings finds the
+    same cases; a changed default is seen all the same, since a run's file names every setting.
     A case that starts from a file gets some settings of its sample from there when it is run;
     these do not count.
     """
-    data = case.model_dump(mode="json", exclude={"name"})
+    data = case.model_dump(mode="json", exclude={"name"}, exclude_defaults=True)
     if case.sample.file is not None:
         for name in _FOUND:
-            data["sample"].pop(name)
+            data["sample"].pop(name, None)
     text = json.dumps(data, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()[:DIGITS]
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, get_args
 
-from granufab.campaign.case_work import Outcome, State
+from granufab.campaign.case_work import Outcome
+from granufab.campaign.folder import State
 from granufab.campaign.settings import COLUMNS
 from granufab.errors import CorruptFile
 from granufab.io import write_text

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile, GranufabError, InvalidPacking, InvalidSettings, MissingData
+from granufab.fabric.criterion import select_contacts
+from granufab.fabric.rattlers import backbone
 from granufab.io.cell_of_frame import cell_of
 from granufab.io.distinct_bodies import check_distinct
 from granufab.io.found import FoundContacts, FoundFrame
@@ -76,10 +78,14 @@ def _assembled(found: FoundFrame, options: ReadOptions, summary: ImportSummary) 
     summary.round_grains = found.round
     summary.grains, summary.frames_read = grains.count, summary.frames_read + 1
     summary.contacts = None if contacts is None else contacts.count
+    packing = Packing(
+        grains=grains, contacts=contacts, cell=cell, time=found.time, source=found.place
+    )
     if contacts is not None:
-        degree = np.bincount(contacts.pair.ravel(), minlength=grains.count)
-        summary.rattlers = int((degree < 2).sum())
-    return Packing(grains=grains, contacts=contacts, cell=cell, time=found.time, source=found.place)
+        rule = "listed" if contacts.force is None else "force"
+        pair = select_contacts(packing, rule).pair
+        summary.rattlers = int((~backbone(pair, grains.count)).sum())
+    return packing
 
 
 @dataclass(frozen=True, slots=True)

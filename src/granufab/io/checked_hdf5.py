@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile, GranufabError, MissingData, UnknownFormat
+from granufab.io.global_heap import heaps_are_sound
 from granufab.io.run_file_checksum import text_checksum
 from granufab.io.schema import FORMAT_NAME, SCHEMA_VERSION, Entry, named
 from granufab.io.unclosed_hdf5 import (
@@ -62,7 +63,7 @@ def is_run_file(path: Path, head: bytes) -> bool:
         return False
     try:
         with _open(path) as (file, *_):
-            return file.attrs.get("format") == FORMAT_NAME
+            return _text(file, "format", path) == FORMAT_NAME
     except BROKEN:
         return True
 
@@ -117,6 +118,25 @@ def _open(path: Path) -> Iterator[tuple[h5py.File, bool, bool]]:
         yield file, unclosed, truncated
 
 
+def _text(file: h5py.File, name: str, path: Path) -> str | None:
+    """A text attribute, of fixed length or (in version 1) not; None where there is none.
+
+    Raises:
+        CorruptFile: its text cannot be read without HDF5 turning in a loop.
+    """
+    if name not in file.attrs:
+        return None
+    kind = h5py.check_string_dtype(file.attrs.get_id(name).dtype)
+    if kind is None:
+        return None
+    if kind.length is None and not heaps_are_sound(path):
+        raise CorruptFile(f"{path}: a heap with the text of its attributes is damaged")
+    value = file.attrs[name]
+    if isinstance(value, bytes):
+        return value.decode()
+    return value if isinstance(value, str) else None
+
+
 class CheckedFile:
     """An open run file; reads only entries of the schema, as hard links to plain datasets.
 
@@ -132,7 +152,7 @@ class CheckedFile:
         self._known: dict[str, h5py.Dataset] = {}
         self.path = path
         self.unclosed = unclosed
-        if file.attrs.get("format") != FORMAT_NAME:
+        if _text(file, "format", path) != FORMAT_NAME:
             raise UnknownFormat(f"{path}: is HDF5, but not a granufab run file")
         self.version = self.whole("schema_version")
         if self.version > SCHEMA_VERSION:
@@ -159,9 +179,9 @@ class CheckedFile:
 
     def text(self, name: str) -> str:
         """A text attribute of the root group."""
-        value = self._file.attrs[name]
-        if not isinstance(value, str):
-            raise self.corrupt(f"attribute {name} is not text")
+        value = _text(self._file, name, self.path)
+        if value is None:
+            raise self.corrupt(f"attribute {name} is missing or not text")
         return value
 
     def texts(self) -> dict[str, str]:

@@ -286,9 +286,8 @@ def _path_of(
     if start is not None and end is not None:
         strain = logarithmic_strain(start, _held(end, start, free))
         if np.abs(strain).max() > UNDEFORMED:
-            values, vectors = np.linalg.eigh(strain)
+            _, vectors = np.linalg.eigh(strain)
             contraction, extension = vectors[:, -1], vectors[:, 0]
-            del values
             if given is not None:
                 contraction, extension = given, _across(given)
             return _Path(start, contraction, extension, "from the cell matrix", free)

@@ -17,6 +17,11 @@ _SHOWN = 5
 """Skipped frames whose reasons are shown to a person; a program gets all of them."""
 
 
+def _many(count: int, what: str) -> str:
+    """A number of things, in the plural where it is not one."""
+    return f"{count} {what}" + ("" if count == 1 else "s")
+
+
 @dataclass(slots=True, kw_only=True)
 class ImportSummary:
     """Counts and conventions, filled while frames are read.
@@ -28,7 +33,7 @@ class ImportSummary:
         grains, contacts: of the frame read last.
         walls_dropped, wall_contacts_dropped, duplicates_dropped, self_contacts_dropped: of all
             frames read.
-        rattlers: grains with fewer than two contacts in the frame read last, or None.
+        rattlers: of the frame read last, as z_backbone counts them, or None.
         round_grains: False where grains are neither disks nor spheres.
         skipped_frames: number and reason of frames that could not be read and were left out.
         conventions: what the normals, forces and dimensions turned out to be, by topic.
@@ -76,8 +81,8 @@ class ImportSummary:
         }
         left_out = ", ".join(f"{count} {what}" for what, count in dropped.items() if count)
         text = [
-            f"{self.format}: {self.frames} frames in {len(self.files)} files, "
-            f"{self.grains} grains, "
+            f"{self.format}: {_many(self.frames, 'frame')} in "
+            f"{_many(len(self.files), 'file')}, {self.grains} grains, "
             + ("no contacts listed" if self.contacts is None else f"{self.contacts} contacts")
             + ("" if self.rattlers is None else f", {self.rattlers} rattlers")
         ]

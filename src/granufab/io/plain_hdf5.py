@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from granufab.errors import CorruptFile, GranufabError
 from granufab.io.checked_hdf5 import BROKEN, HDF5_SIGNATURE, LARGEST_RATIO, storage_fault
+from granufab.io.global_heap import heaps_are_sound
 
 __all__ = ["PlainHdf5", "holds_groups", "open_plain"]
 
@@ -90,6 +91,9 @@ class PlainHdf5:
         node = self._node(name)
         if node is None:
             return {}
+        kinds = (h5py.check_string_dtype(node.attrs.get_id(key).dtype) for key in node.attrs)
+        if any(kind and kind.length is None for kind in kinds) and not heaps_are_sound(self.path):
+            raise self.corrupt(f"a heap with the attributes of dataset {name} is damaged")
         plain = {key: node.attrs[key] for key in node.attrs}
         return {k: v.decode("utf-8", "replace") if isinstance(v, bytes) else v
                 for k, v in plain.items()}  # fmt: skip

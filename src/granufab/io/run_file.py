@@ -23,7 +23,7 @@ from granufab.history import SERIES_UNITS, Frame
 from granufab.io.abandoned_hdf5 import give_up, reason_of
 from granufab.io.provenance import provenance as collect_provenance
 from granufab.io.run_file_checksum import frame_checksum, row_checksums, text_checksum
-from granufab.io.run_file_layout import RAGGED, create_file, growing, number
+from granufab.io.run_file_layout import RAGGED, create_file, growing, number, set_text
 from granufab.io.run_lock import RunLock
 from granufab.io.schema import (
     FORMAT_NAME,
@@ -232,15 +232,10 @@ class RunFileWriter:
         try:
             self._file = create_file(path, force)
             checksum = text_checksum(SCHEMA_VERSION, *(texts[name] for name in sorted(texts)))
-            attributes = {
-                "format": FORMAT_NAME,
-                "schema_version": SCHEMA_VERSION,
-                **texts,
-                "dimension": 0,
-                "grain_count": 0,
-                "checksum": np.uint64(checksum),
-            }
-            for name, value in attributes.items():
+            for name, text in {"format": FORMAT_NAME, **texts}.items():
+                set_text(self._file, name, text)
+            attributes = {"schema_version": SCHEMA_VERSION, "dimension": 0, "grain_count": 0}
+            for name, value in {**attributes, "checksum": np.uint64(checksum)}.items():
                 self._file.attrs[name] = value
             self._counters: dict[str, Any] = {
                 e.name: number(self._file, e) for e in entries("scalar")

@@ -12,7 +12,7 @@ from granufab.errors import InvalidSettings
 from granufab.io.schema import Entry
 from granufab.io.unclosed_hdf5 import close_left_open
 
-__all__ = ["RAGGED", "create_file", "growing", "number", "reopen_file"]
+__all__ = ["RAGGED", "create_file", "growing", "number", "reopen_file", "set_text"]
 
 RAGGED = ("contacts", "wall_contacts")
 """What grows by the pairs of a frame."""
@@ -58,6 +58,12 @@ def reopen_file(path: Path) -> h5py.File:
     """
     close_left_open(path)
     return h5py.File(path, "r+", **_OPENING)
+
+
+def set_text(file: h5py.File, name: str, text: str) -> None:
+    """An attribute of fixed length: it lies in the header, which HDF5 guards by a checksum."""
+    content = text.encode()
+    file.attrs.create(name, content, dtype=h5py.string_dtype("utf-8", len(content)))
 
 
 def number(file: h5py.File, entry: Entry) -> h5py.Dataset:

@@ -69,7 +69,11 @@ class UnclosedFile(io.FileIO):
         self._size = super().seek(0, io.SEEK_END)
         if is_truncated(head, self._size) and not is_unclosed(head):
             self._size = struct.unpack_from("<Q", head, _END)[0]
-        self._head = _closed(head, self._size)
+        try:
+            self._head = _closed(head, self._size)
+        except OSError:
+            self.close()
+            raise
 
     def seek(self, offset: int, whence: int = io.SEEK_SET, /) -> int:
         """Move to a byte, also behind the end of what is there."""

@@ -41,6 +41,7 @@ def _is_contacts(head: bytes) -> bool:
 
 def _sample(spheres: Path, contacts: Path | None) -> FoundFrame:
     table = number_table(spheres, (0, 2, 3, 4, 5), columns=6)
+    _check_shapes(spheres)
     return FoundFrame(
         place=str(spheres),
         position=table[:, 1:4],
@@ -50,6 +51,15 @@ def _sample(spheres: Path, contacts: Path | None) -> FoundFrame:
         cell=_box(spheres),
         contacts=None if contacts is None else _contacts(contacts),
     )
+
+
+def _check_shapes(spheres: Path) -> None:
+    """Refuse other shapes than spheres: their fifth number is no radius."""
+    with spheres.open(errors="replace") as stream:
+        for number, line in enumerate(stream, 1):
+            words = line.split()
+            if words and not words[0].startswith("#") and words[1] != "Sphere":
+                raise CorruptFile(f"{spheres}: line {number}: shape {words[1]!r}, expected Sphere")
 
 
 def _box(spheres: Path) -> FoundCell | None:
