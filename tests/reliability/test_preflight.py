@@ -153,7 +153,7 @@ def test_a_hundred_million_grains_are_refused_in_one_line(tmp_path: Path) -> Non
     assert done.returncode == 2, done.stderr
     assert done.stderr.count("\n") == 1
     assert "sample.grain_count = 100000000" in done.stderr
-    assert "130 GB of memory" in done.stderr
+    assert "270 GB of memory" in done.stderr
     assert "ulimit -v" in done.stderr
     assert not (tmp_path / "case" / "run.h5").exists()
 

@@ -37,6 +37,7 @@ __all__ = [
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 _LARGEST_CHUNK_BYTES = 16 * 2**20
+_KEPT = 2**20  # bytes of chunks of each dataset in memory; HDF5 2.0 would keep 8 MiB
 _LEAST_RECORD = 128  # bytes that any frame and any row takes, uncompressed
 LARGEST_RATIO = 1100  # deflate shrinks by 1032 at most, so no dataset declares more than this
 BROKEN = (
@@ -107,9 +108,11 @@ def _open(path: Path) -> Iterator[tuple[h5py.File, bool, bool]]:
         try:
             if unclosed or truncated:
                 stream = stack.enter_context(UnclosedFile(path))
-                file = stack.enter_context(h5py.File(stream, "r"))
+                file = stack.enter_context(h5py.File(stream, "r", rdcc_nbytes=_KEPT))
             else:
-                file = stack.enter_context(h5py.File(path, "r", locking="best-effort"))
+                file = stack.enter_context(
+                    h5py.File(path, "r", locking="best-effort", rdcc_nbytes=_KEPT)
+                )
         except OSError as error:
             raise CorruptFile(f"{path}: is truncated or damaged ({first_line(error)})") from None
         yield file, unclosed, truncated

@@ -24,7 +24,11 @@ _COMPRESSION: dict[str, Any] = {
     "fletcher32": True,
 }
 _LARGEST_CHUNK = 16384
-_VERSIONS: Any = ("v110", "latest")
+_OPENING: dict[str, Any] = {
+    "libver": ("v110", "latest"),
+    "locking": "best-effort",
+    "rdcc_nbytes": 2**20,  # kept of each dataset; HDF5 2.0 would keep 8 MiB, never read again
+}
 
 
 def create_file(path: Path, force: bool) -> h5py.File:
@@ -38,7 +42,7 @@ def create_file(path: Path, force: bool) -> h5py.File:
     try:
         if force:
             path.unlink(missing_ok=True)
-        return h5py.File(path, "x", libver=_VERSIONS, locking="best-effort")
+        return h5py.File(path, "x", **_OPENING)
     except FileExistsError:
         raise InvalidSettings(f"{path}: exists already; use force to replace it") from None
     except OSError as error:
@@ -53,7 +57,7 @@ def reopen_file(path: Path) -> h5py.File:
         OSError: HDF5 cannot open it so.
     """
     close_left_open(path)
-    return h5py.File(path, "r+", libver=_VERSIONS, locking="best-effort")
+    return h5py.File(path, "r+", **_OPENING)
 
 
 def set_text(file: h5py.File, name: str, text: str) -> None:

@@ -12,14 +12,14 @@ from granufab.simulate.settings import Case, Sample, Stage
 
 __all__ = ["Demand", "demand_of", "steps_of_stage"]
 
-FIXED_BYTES = 60e6
-"""Compiled kernels and libraries."""
-GRAIN_BYTES = {2: 1300.0, 3: 3300.0}
-"""Of the engine, its largest moment (a new list of pairs while a frame or checkpoint is held)."""
+FIXED_BYTES = 300e6
+"""Libraries and kernels, which may have to be compiled first."""
+GRAIN_BYTES = {2: 2700.0, 3: 5500.0}
+"""Of sample, engine, frame and checkpoint together, and of the summary, which reads two frames."""
 PROGRAM_BYTES = {2: 7000.0, 3: 40000.0}
 """Of the linear programs that bring frictionless samples to rest."""
 PROGRAM_GRAINS = {2: 50_000, 3: 8_000}
-FRAME_BYTES = {2: 200.0, 3: 350.0}
+FRAME_BYTES = {2: 140.0, 3: 270.0}
 """Of a frame in the run file, a grain's share."""
 FRAME_FIXED, ROW_BYTES = 2e4, 200.0
 CHECKPOINT_BYTES = {2: 500.0, 3: 900.0}

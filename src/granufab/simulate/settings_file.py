@@ -38,15 +38,24 @@ def describe_error(error: ValidationError, model: type[BaseModel]) -> str:
         model: of the whole file.
     """
     first = error.errors()[0]
-    location = ".".join(str(part) for part in first["loc"])
+    location = _short(".".join(str(part) for part in first["loc"]))
     if first["type"] == "extra_forbidden":
         known = _known_names(model, first["loc"])
         near = difflib.get_close_matches(str(first["loc"][-1]), known, n=1, cutoff=0.0)
         hint = f"; did you mean {near[0]}?" if near else ""
         return f"unknown key {location}{hint} (known: {', '.join(known)})"
-    message = first["msg"].removeprefix("Value error, ")
-    got = "" if first["type"] in ("value_error", "missing") else f", got {first['input']!r}"
+    message = _short(first["msg"].removeprefix("Value error, "), 1000)
+    got = (
+        ""
+        if first["type"] in ("value_error", "missing")
+        else f", got {_short(repr(first['input']))}"
+    )
     return f"{location}: {message}{got}" if location else message
+
+
+def _short(text: str, most: int = 200) -> str:
+    """A text without its middle where it is long: a line must stay one to read."""
+    return text if len(text) <= most else f"{text[: most // 2]} … {text[-most // 4 :]}"
 
 
 def _known_names(model: type[BaseModel], location: tuple[int | str, ...]) -> list[str]:
