@@ -93,6 +93,8 @@ def run(
     for line in result.summary.get("start", {}).get("notes", ()):
         print(f"granufab: start: {line}", file=sys.stderr)
     pairs = [*_fabric_pairs(settings, result), *solver_pairs(result.summary)]
+    if result.summary.get("resumed"):
+        pairs.append(("resumed from a checkpoint", f"{result.summary['resumed']} times"))
     print_pairs(result.name, [*pairs, ("files in", folder)])
     for warning in result.summary.get("warnings", ()):
         print(f"warning: {warning}")

@@ -1,7 +1,7 @@
 """What a planned run needs: steps, records, memory, disk, time; from its settings alone.
 
-Bytes are measured peaks (docs/reliability.md), rounded up; the time is a rough guess for quasi-static
-shear at the default tolerance.
+Bytes are measured peaks (docs/reliability.md), rounded up; the time is a rough guess for
+quasi-static shear at the default tolerance.
 """
 
 from __future__ import annotations
