@@ -21,6 +21,7 @@ RUN_EXAMPLES = {
     "forces": 2,
     "local-problems": 2,
     "orientation": 3,
+    "reliability": 2,
     "run-file": 2,
     "velocity": 2,
 }

@@ -187,3 +187,22 @@ def test_dry_run_tells_and_does_nothing(tmp_path: Path, capsys: pytest.CaptureFi
     for word in ("steps", "frames", "memory", "disk", "time", "500", "20000"):
         assert word in out
     assert not (tmp_path / "case").exists()
+
+
+def test_linear_programs_count_where_they_are_used() -> None:
+    """Frictionless samples, or a wanted z, up to the size that the programs take."""
+
+    def memory(**sample: Any) -> int:
+        return demand_of(Case(sample=Sample(**sample))).memory
+
+    rough, smooth = memory(grain_count=2000, friction=0.3), memory(grain_count=2000)
+    assert smooth - rough == pytest.approx(2000 * 6000 * (2000 / 1500) ** 0.15, rel=1e-6)
+    assert memory(grain_count=2000, coordination=3.5, friction=0.3) == smooth
+    assert memory(grain_count=60_000) == memory(grain_count=60_000, friction=0.3)
+    assert demand_of(Case(sample=Sample(grain_count=2000)), prepared=True).memory == rough
+
+
+def test_the_guess_of_the_engines_limit_is_the_engines() -> None:
+    from granufab.simulate import demand, jamming
+
+    assert demand.PROGRAM_GRAINS == jamming.LARGEST

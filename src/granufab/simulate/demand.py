@@ -1,6 +1,7 @@
 """What a planned run needs: steps, records, memory, disk, time; from its settings alone.
 
-Bytes are measured peaks (docs/reliability.md), rounded up; the time is a rough guess.
+Bytes are measured peaks (docs/reliability.md), rounded up; the time is a rough guess for
+quasi-static shear at the default tolerance.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ FIXED_BYTES = 300e6
 """Libraries and kernels, which may have to be compiled first."""
 GRAIN_BYTES = {2: 2700.0, 3: 5500.0}
 """Of sample, engine, frame and checkpoint together, and of the summary, which reads two frames."""
-PROGRAM_BYTES = {2: 7000.0, 3: 40000.0}
-"""Of the linear programs that bring frictionless samples to rest."""
+PROGRAM_BYTES, PROGRAM_SAMPLE = {2: 6000.0, 3: 42000.0}, 1500
+"""Of the linear programs that bring frictionless samples of so many grains to rest."""
+PROGRAM_GROWTH = {2: 0.15, 3: 0.45}
+"""Power of the grain count with which they grow: the fill of a sparse factor."""
 PROGRAM_GRAINS = {2: 50_000, 3: 8_000}
 FRAME_BYTES = {2: 140.0, 3: 270.0}
 """Of a frame in the run file, a grain's share."""
@@ -25,10 +28,10 @@ FRAME_FIXED, ROW_BYTES = 2e4, 200.0
 CHECKPOINT_BYTES = {2: 500.0, 3: 900.0}
 CHECKPOINTS = 3
 """The present one, the one before, and the one that is written."""
-STEP_SECONDS = {2: 1e-6, 3: 2e-6}
+STEP_SECONDS = {2: 5e-7, 3: 1.6e-6}
 """Of a step, a grain's share, on one processor."""
-PREPARATION_SECONDS = {2: 1e-3, 3: 2e-3}
-"""Of the sample, a grain's share."""
+PREPARATION_SECONDS, PROGRAM_SECONDS = {2: 2e-3, 3: 2e-3}, {2: 8e-3, 3: 3e-2}
+"""Of the sample, a grain's share, and of the linear programs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,12 +71,15 @@ def demand_of(case: Case, *, prepared: bool = False) -> Demand:
     kept = CHECKPOINTS * CHECKPOINT_BYTES[dimension] * count
     disk = frames * (FRAME_FIXED + FRAME_BYTES[dimension] * count) + rows * ROW_BYTES + kept
     seconds = steps * count * STEP_SECONDS[dimension]
+    programs = not prepared and _takes_programs(sample)
     seconds += 0.0 if prepared else count * PREPARATION_SECONDS[dimension]
+    seconds += count * PROGRAM_SECONDS[dimension] if programs else 0.0
+    grain = GRAIN_BYTES[dimension] + (_program_bytes(sample) if programs else 0.0)
     return Demand(
         steps=steps,
         frames=frames,
         rows=rows,
-        memory=int(FIXED_BYTES + count * _bytes_of_grain(sample, prepared=prepared)),
+        memory=int(FIXED_BYTES + count * grain),
         disk=int(disk),
         seconds=seconds,
     )
@@ -92,9 +98,11 @@ def steps_of_stage(case: Case, stage: Stage) -> int:
     return math.ceil(abs(stage.strain) / min(solver.time_step * time * rate, solver.step_strain))
 
 
-def _bytes_of_grain(sample: Sample, *, prepared: bool) -> float:
-    """Of the largest moment: the linear programs where they are used, else the engine."""
-    dimension = sample.dimension
+def _takes_programs(sample: Sample) -> bool:
     smooth = sample.friction == 0 or sample.coordination is not None
-    programs = not prepared and smooth and sample.grain_count <= PROGRAM_GRAINS[dimension]
-    return GRAIN_BYTES[dimension] + (PROGRAM_BYTES[dimension] if programs else 0.0)
+    return smooth and sample.grain_count <= PROGRAM_GRAINS[sample.dimension]
+
+
+def _program_bytes(sample: Sample) -> float:
+    growth = (sample.grain_count / PROGRAM_SAMPLE) ** PROGRAM_GROWTH[sample.dimension]
+    return PROGRAM_BYTES[sample.dimension] * max(1.0, growth)
