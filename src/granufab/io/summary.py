@@ -75,6 +75,8 @@ def replacing(path: Path | str) -> Iterator[Path]:
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
+        if error.errno in _FULL and "cannot be written" in str(error.strerror):  # told already
+            raise
         if error.errno in _FULL:
             raise OSError(error.errno, f"cannot be written ({error.strerror})", str(path)) from None
         raise InvalidSettings(
