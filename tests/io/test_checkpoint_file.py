@@ -286,3 +286,16 @@ def test_arrays_are_not_copied(tmp_path: Path) -> None:
         tracemalloc.stop()
     assert written < 4e6
     assert read < 32e6 + 4e6
+
+
+def test_a_first_checkpoint_that_was_cut_short_is_no_checkpoint(tmp_path: Path) -> None:
+    """A process that dies in its first write leaves a temporary file only."""
+    path = tmp_path / "checkpoint"
+    write_checkpoint(path, {"a": np.arange(100.0)}, {})
+    content = path.read_bytes()
+    path.unlink()
+    path.with_name(".checkpoint.tmp").write_bytes(content[: len(content) // 2])
+    with pytest.raises(MissingData, match="no checkpoint"):
+        read_checkpoint(path)
+    path.with_name(".checkpoint.tmp").write_bytes(content)  # it died before the rename
+    assert (read_checkpoint(path).arrays["a"] == np.arange(100.0)).all()

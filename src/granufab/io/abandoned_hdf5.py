@@ -13,7 +13,10 @@ from contextlib import suppress
 
 import h5py
 
-__all__ = ["give_up", "reason_of"]
+__all__ = ["FAULTS", "give_up", "reason_of"]
+
+FAULTS = (OSError, RuntimeError, ValueError, KeyError, AttributeError)
+"""What h5py raises where HDF5 cannot write: the kind depends on the call that found it."""
 
 
 def give_up(file: h5py.File) -> None:

@@ -134,7 +134,7 @@ def read_checkpoint(path: Path | str) -> Checkpoint:
             continue
         warning = f"{'; '.join(faults)}; {candidate.name} is used" if faults else None
         return Checkpoint(arrays=arrays, notes=notes, warning=warning)
-    if len(faults) == 1 and not path.is_file():
+    if not path.is_file() and not previous_of(path).is_file():  # at most a first one, half written
         raise MissingData(f"{path}: no checkpoint is there")
     raise CorruptFile("; ".join(fault for fault in faults if not fault.endswith("no such file")))
 

@@ -18,9 +18,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from granufab.errors import InvalidPacking, InvalidSettings
+from granufab.errors import GranufabError, InvalidPacking, InvalidSettings
 from granufab.history import SERIES_UNITS, Frame
-from granufab.io.abandoned_hdf5 import give_up, reason_of
+from granufab.io.abandoned_hdf5 import FAULTS, give_up, reason_of
 from granufab.io.provenance import provenance as collect_provenance
 from granufab.io.run_file_checksum import frame_checksum, row_checksums, text_checksum
 from granufab.io.run_file_layout import RAGGED, create_file, growing, number, set_text
@@ -58,6 +58,8 @@ class RunFileWriter:
         InvalidSettings: the file exists, cannot be written or is written by another process, or
             the settings' ``name`` is longer than the file's schema allows.
     """
+
+    _given_up = False
 
     def __init__(
         self,
@@ -158,7 +160,9 @@ class RunFileWriter:
                 self._start(grains)
             self._append_frame(stored_frame(frame))
             self._commit("complete_frames", self._frames + 1)
-        except (OSError, RuntimeError) as error:
+        except GranufabError:
+            raise
+        except FAULTS as error:
             raise self._failed(f"frame {self._frames}", error) from None
         self._frames += 1
 
@@ -194,7 +198,9 @@ class RunFileWriter:
                 self._put_rows(name, self._rows, end, value)
             self._put_rows(ROW_CHECKSUM, self._rows, end, row_checksums(columns, self._rows))
             self._commit("complete_rows", end)
-        except (OSError, RuntimeError) as error:
+        except GranufabError:
+            raise
+        except FAULTS as error:
             raise self._failed(f"row {self._rows}", error) from None
         self._rows = end
 
@@ -206,7 +212,8 @@ class RunFileWriter:
         Raises:
             OSError: it could not be written; frames and rows are safe.
         """
-        if not self._file:
+        if not self._file or self._given_up:
+            self._release()
             return
         try:
             if summary is not None:
@@ -219,7 +226,9 @@ class RunFileWriter:
                 self._commit("finished", 1)
             self._file.flush()
             self._file.close()
-        except (OSError, RuntimeError) as error:
+        except GranufabError:
+            raise
+        except FAULTS as error:
             raise self._failed("the end of the file", error) from None
         finally:
             self._release()
@@ -245,7 +254,7 @@ class RunFileWriter:
             self._file.flush()
         except BaseException as error:
             self._release()
-            if isinstance(error, OSError | RuntimeError) and hasattr(self, "_file"):
+            if isinstance(error, FAULTS) and hasattr(self, "_file"):
                 raise self._failed("its head", error) from None
             raise
 
@@ -328,10 +337,11 @@ class RunFileWriter:
 
     def _check_open(self, what: str) -> None:
         """Refuse to write on after a failure, which has closed the file."""
-        if not self._file:
+        if not self._file or self._given_up:
             raise OSError(f"{self.path}: {what} cannot be written, the file was closed")
 
     def _failed(self, what: str, error: Exception) -> OSError:
+        self._given_up = True  # HDF5 may keep it open: it must not be touched again
         give_up(self._file)
         return OSError(
             f"{self.path}: {what} could not be written ({reason_of(error)}); "
