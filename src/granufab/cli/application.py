@@ -24,6 +24,7 @@ from granufab.cli import (
     reproduce,
     run,
     sweep,
+    view,
 )
 
 __all__ = ["app"]
@@ -48,6 +49,7 @@ app.command("criterion")(criterion.criterion)
 app.command("fit")(fit.fit)
 app.command("predict")(predict.predict)
 app.command("plot")(plot.plot)
+app.command("view")(view.view)
 app.command("info")(info.info)
 app.command("check")(check.check)
 app.command("repair")(repair.repair)

@@ -135,8 +135,9 @@ def _measured_series(files: Sequence[Path], foreign: ForeignOptions) -> list[xr.
 
 
 def _single_paths(table: xr.Dataset) -> list[xr.Dataset]:
-    if "eps_q" not in table or bool(table["eps_q"].isnull().all()):
-        table = table.assign(eps_q=("record", [float(k) for k in range(table.sizes["record"])]))
+    from granufab.reproduce.series_fit import counted_strain
+
+    table = counted_strain(table)
     if "path" not in table.coords:
         return [table]
     names = dict.fromkeys(table.coords["path"].values.tolist())

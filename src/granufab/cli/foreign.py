@@ -145,11 +145,13 @@ class Opened:
         files: one run file, or foreign files that belong together.
         run: its frames are read when asked for.
         skips: damaged frames are left out.
+        foreign: it is another program's data.
     """
 
     files: tuple[Path, ...]
     run: Run
     skips: bool = False
+    foreign: bool = False
 
     @property
     def name(self) -> str:
@@ -193,6 +195,7 @@ def open_runs(
             files=tuple(group),
             run=read(*group, **(keywords if foreign else {})),
             skips=foreign and options.skip_damaged,
+            foreign=foreign,
         )
         for group, foreign in groups
     ]

@@ -89,7 +89,7 @@ class RunFileFrames(Sequence[Frame]):
     def __init__(self, path: Path, created: str, count: int) -> None:
         self.path = path.absolute()
         self._source = str(path)
-        self._created = created
+        self.created = created
         self._count = count
 
     def __len__(self) -> int:
@@ -110,7 +110,7 @@ class RunFileFrames(Sequence[Frame]):
         if not 0 <= position < self._count:
             raise IndexError(f"{self._source}: no frame {index}, it holds {self._count}")
         with opened(self.path) as file:
-            if file.text("created") != self._created:
+            if file.text("created") != self.created:
                 raise file.corrupt("was replaced since it was opened; read it again")
             return read_frame(file, position, self._source)
 

@@ -14,7 +14,7 @@ from granufab.states import AccessibleFit, fit_accessible_states
 from granufab.states.domain import Mode
 from granufab.states.fit import Method
 
-__all__ = ["default_definition", "fit_series", "known_rows"]
+__all__ = ["counted_strain", "default_definition", "fit_series", "known_rows"]
 
 
 def fit_series(
@@ -40,6 +40,13 @@ def fit_series(
     options = fit_symmetry(symmetries, stages).options()
     strain, z, a = ([row[name] for row in rows] for name in ("eps_q", definition, "a"))
     return fit_accessible_states(strain, z, a, method=method, seeds=seeds, **options), definition
+
+
+def counted_strain(path: xr.Dataset) -> xr.Dataset:
+    """The series itself, or with its rows (frames) as strain where it holds none."""
+    if "eps_q" in path and not bool(path["eps_q"].isnull().all()):
+        return path
+    return path.assign(eps_q=("record", [float(k) for k in range(path.sizes["record"])]))
 
 
 def default_definition(paths: Sequence[xr.Dataset]) -> str:
