@@ -166,7 +166,7 @@ class Run:
         source = self.series_source
         return source() if callable(source) else source
 
-    @property
+    @cached_property
     def dimension(self) -> int:
         """2 or 3.
 

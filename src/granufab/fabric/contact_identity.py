@@ -21,6 +21,7 @@ from granufab.errors import InvalidPacking, InvalidSettings
 from granufab.fabric.coordination import ZDefinition, coordination, counted_contacts
 from granufab.fabric.criterion import Criterion, select_contacts, wall_support
 from granufab.fabric.neighbours import branch_vectors
+from granufab.fabric.row_labels import row_labels
 from granufab.packing import Array, Contacts, IntArray, Packing
 
 __all__ = [
@@ -162,10 +163,11 @@ def identify(packing: Packing, contacts: Contacts, change: IntArray) -> Identifi
 
 def _check_once(packing: Packing, contacts: Contacts, key: IntArray) -> None:
     """Refuse a second contact of two grains that touch as round ones do."""
-    unique, group, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
-    if len(unique) == len(key):
+    label = row_labels(key)
+    count = np.bincount(label)
+    if len(count) == len(key):
         return
-    rows = np.flatnonzero(count[group.reshape(-1)] > 1)
+    rows = np.flatnonzero(count[label] > 1)
     keep = np.zeros(len(key), bool)
     keep[rows] = True
     several = contacts.select(keep)
@@ -218,7 +220,7 @@ def persistent(before: IdentifiedContacts, after: IdentifiedContacts) -> tuple[I
             f"{after.grain_count}), so contacts cannot be followed; N must be fixed"
         )
     keys = np.concatenate([before.key, after.key])
-    label = np.unique(keys, axis=0, return_inverse=True)[1].reshape(-1)
+    label = row_labels(keys)
     first, second = label[: before.count], label[before.count :]
     counts = [np.bincount(part, minlength=len(keys)) for part in (first, second)]
     single = (counts[0] <= 1) & (counts[1] <= 1)
