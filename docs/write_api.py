@@ -43,7 +43,7 @@ def _member(item: ast.stmt) -> list[str]:
     decorators = [ast.unparse(decorator) for decorator in item.decorator_list]
     if any("validator" in decorator for decorator in decorators):
         return []
-    if "property" in decorators:
+    if {"property", "cached_property"} & set(decorators):
         return [_named(item.name, item.returns, None)]
     return [_function(item, method=True)]
 
