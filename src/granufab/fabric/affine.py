@@ -12,7 +12,7 @@ __all__ = ["affine_current", "affine_turning", "mean_gradient"]
 
 
 def affine_turning(normal: Array, gradient: Array) -> Array:
-    r"""Rate at which normals turn with an affine flow, :math:`\dot n = (1 - n⊗n)\,L\,n`.
+    r"""Rate at which normals turn with an affine flow, :math:`\dot n = (1 - n\otimes n)\,L\,n`.
 
     In a 2D pure shear with contraction along θ = 0 this is θ̇ = (ε̇_q/2) sin 2θ.
 

@@ -68,7 +68,7 @@ def sphere_orientation(
     :math:`\hat S_l = [N S_l - (2l+1)]/(N-1)` is free of that bias (it may be negative).
     Its error is on the safe side, up to a quarter too large, where there is no power.
 
-    Cells: 3·``rings``² of one area on the hemisphere z ≥ 0, n and −n being one direction.
+    Cells: 3 ``rings``\ ² of one area on the hemisphere z ≥ 0, n and −n being one direction.
 
     Args:
         contacts: those that z counts (:func:`~granufab.fabric.select_network`), in 3D.

@@ -1,0 +1,41 @@
+"""Settings of the documentation: built by ``make docs``, with warnings as errors."""
+
+import sys
+from importlib import metadata
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
+
+project = "granufab"
+author = "The granufab authors"
+copyright = "The granufab authors"  # noqa: A001
+release = metadata.version("granufab")
+
+extensions = [
+    "mathml",
+    "plain_bars",
+    "reference",
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+]
+html_math_renderer = "mathml"
+exclude_patterns = ["_extensions", "**/README.md"]
+source_suffix = {".md": "myst-nb", ".rst": "restructuredtext", ".ipynb": "myst-nb"}
+
+myst_enable_extensions = ["dollarmath", "attrs_inline"]
+myst_heading_anchors = 3
+nb_execution_mode = "cache"
+nb_execution_timeout = 120
+nb_execution_raise_on_error = True
+
+autodoc_typehints = "signature"
+autodoc_member_order = "bysource"
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+
+html_theme = "furo"
+html_title = f"granufab {release}"
+html_copy_source = False
+suppress_warnings = ["ref.python", "config.cache"]
