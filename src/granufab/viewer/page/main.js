@@ -3,10 +3,10 @@
 import { moved } from "./domain.js";
 import { PackingView } from "./packing.js";
 import { drawMohr, drawPath, drawRose, drawSeries } from "./panels.js";
-import { Failure, Source } from "./source.js";
+import { Failure, openSource } from "./source.js";
 
 const $ = (id) => document.getElementById(id);
-const source = new Source();
+const source = openSource();
 const view = { run: 0, frame: -1, definition: "z_backbone", kind: "", level: 16, colour: "contact_number", lines: "force", plane: "a", theme: "", low: "", high: "" };
 const known = { listed: [], overview: null, series: [], fit: null, state: null, curves: null, ticket: 0 };
 const packing = new PackingView($("canvas"), (words) => { $("picked").textContent = words; });
