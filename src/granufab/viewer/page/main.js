@@ -7,7 +7,7 @@ import { Failure, openSource } from "./source.js";
 
 const $ = (id) => document.getElementById(id);
 const source = openSource();
-const view = { run: 0, frame: -1, definition: "z_backbone", kind: "", level: 16, colour: "contact_number", lines: "force", plane: "a", theme: "", low: "", high: "" };
+const view = { run: 0, frame: -1, definition: "z_backbone", kind: "", level: 16, colour: "contact_number", lines: "force", images: "border", plane: "a", theme: "", low: "", high: "" };
 const known = { listed: [], overview: null, series: [], fit: null, state: null, curves: null, ticket: 0 };
 const packing = new PackingView($("canvas"), (words) => { $("picked").textContent = words; });
 const told = (text) => { $("message").textContent = text || ""; };
@@ -61,7 +61,7 @@ async function showFrame() {
     if (ticket !== known.ticket) return; // another frame was asked for meanwhile
     known.state = state;
     packing.show(data);
-    $("legend").textContent = packing.prepared ? packing.prepared.shade.legend : "";
+    $("legend").textContent = packing.legend;
     const eps = frames.eps_q[view.frame];
     $("place").textContent = `frame ${frames.number[view.frame]} of ${frames.number.length}${eps === null ? "" : ` · ε_q = ${eps.toFixed(4)}`}`;
     numbers(state);
@@ -174,8 +174,6 @@ async function play() {
 function dress() {
   const dark = view.theme ? view.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
   document.documentElement.classList.toggle("dark", dark);
-  packing.prepared = null;
-  packing.draw();
   if (known.state) charts();
 }
 
@@ -190,24 +188,29 @@ changing("run", "run", () => { view.frame = -1; openRun(); });
 changing("definition", "definition", () => openRun());
 changing("kind", "kind", () => showFrame());
 changing("threshold", "level", () => showFrame(), "input");
-changing("colour", "colour", () => { packing.set({ colour: view.colour }); $("legend").textContent = packing.prepared.shade.legend; remember(); });
+changing("colour", "colour", () => { packing.set({ colour: view.colour }); $("legend").textContent = packing.legend; remember(); });
 changing("lines", "lines", () => { packing.set({ lines: view.lines }); remember(); });
+changing("images", "images", () => { packing.set({ images: view.images }); remember(); });
 changing("plane", "plane", () => { charts(); remember(); });
 changing("low", "low", () => { charts(); remember(); }, "input");
 changing("high", "high", () => { charts(); remember(); }, "input");
 changing("frame", "frame", () => showFrame(), "input");
 $("threshold").value = view.level;
-packing.set({ colour: view.colour, lines: view.lines });
+packing.set({ colour: view.colour, lines: view.lines, images: view.images });
 $("fitted").addEventListener("click", () => { view.low = view.high = ""; handles(); charts(); remember(); });
 $("whole").addEventListener("click", () => packing.whole());
 $("play").addEventListener("click", play);
 $("theme").addEventListener("click", () => { view.theme = document.documentElement.classList.contains("dark") ? "light" : "dark"; dress(); remember(); });
-$("save").addEventListener("click", () => {
-  const link = document.createElement("a");
-  link.download = `packing-${view.frame}.png`;
-  link.href = $("canvas").toDataURL("image/png");
-  link.click();
-});
+for (const button of document.querySelectorAll("#packing button.save")) {
+  button.addEventListener("click", async () => {
+    const type = button.dataset.type;
+    const link = document.createElement("a");
+    link.download = `packing-${view.frame}.${type}`;
+    link.href = URL.createObjectURL(await packing.picture(type === "svg" ? "image/svg+xml" : "image/png"));
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  });
+}
 addEventListener("keydown", (event) => {
   if (["SELECT", "INPUT"].includes(event.target.tagName) && event.target.id !== "frame") return;
   const steps = { ArrowRight: 1, ArrowLeft: -1, PageDown: 10, PageUp: -10, Home: -1e9, End: 1e9 };
