@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-import granufab
 from granufab.errors import InvalidSettings
 from granufab.fabric.coordination import ZDefinition
 from granufab.io.summary import replacing
+from granufab.version import VERSION
 from granufab.viewer.page_files import page_files
 from granufab.viewer.run_data import fit_data
 from granufab.viewer.saved_run import SavedRun, compressed
@@ -48,7 +48,7 @@ class SavedPage:
 def saved_page(
     runs: Sequence[ViewedRun],
     *,
-    frames: slice = slice(None),
+    frames: slice | Sequence[slice] = slice(None),
     most: str | float = MOST,
     progress: Progress | None = None,
 ) -> SavedPage:
@@ -56,7 +56,8 @@ def saved_page(
 
     Args:
         runs: what is looked at.
-        frames: the part of each run's frames that is kept, by their places.
+        frames: the part of each run's frames that is kept, by their places; one part for all
+            runs, or one for each.
         most: largest size, in bytes or in words such as ``20MB``; frames above it are left out
             evenly, but never the first and the last.
         progress: is called with a text and the fraction done.
@@ -68,7 +69,8 @@ def saved_page(
     tell: Progress = progress or (lambda text, fraction: None)
     files = page_files()
     tell("reading", 0.0)
-    saved = [SavedRun(viewed, index, frames) for index, viewed in enumerate(runs)]
+    parts = [frames] * len(runs) if isinstance(frames, slice) else frames
+    saved = [SavedRun(*one, part) for one, part in zip(enumerate(runs), parts, strict=True)]
     before, behind = page_parts(files, f"granufab: {', '.join(one.name for one in saved)}")
     rest = len(before) + len(behind)
     fits = {name: fit_data(runs, z_definition=name) for name in get_args(ZDefinition)}
@@ -110,7 +112,7 @@ def _contents(
         "runs": [one.contents(places) for one, places in zip(saved, kept, strict=True)],
         "fits": fits,
         "choices": choices,
-        "saved": {"program": f"granufab {granufab.__version__}", "lines": lines},
+        "saved": {"program": f"granufab {VERSION}", "lines": lines},
     }
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return data_block(CONTENTS, compressed(text.encode())), lines
@@ -130,7 +132,7 @@ def _fitted(
             )
             raise InvalidSettings(
                 f"a page of these runs takes {least / 1e6:.2g} MB with their first and last "
-                f"frames alone, {limit / 1e6:.2g} MB are allowed; raise --most"
+                f"frames alone, {limit / 1e6:.2g} MB are allowed; allow more"
             )
         places = [
             [one.wanted[k] for k in evenly(count, number)]

@@ -83,7 +83,7 @@ def saved_frame(frame: Frame, rules: Sequence[Rule]) -> SavedFrame:
             continue
         found, more = _list_arrays(pairs, count, name)
         masks = {k: _mask(pairs.contacts, packing, rules[k]) for k in mine if counted[k].known}
-        arrays |= found | _levels(name, rules, masks, pairs.contacts.count)
+        arrays |= found | _levels(name, rules, masks)
         steps |= more
     mean = words["criteria"][0]["mean_normal_force"].get(rules[0].choice.z_definition)
     quantised = {"position": steps["position"], **steps}
@@ -229,9 +229,7 @@ def _mask(contacts: Contacts, packing: Packing, rule: Rule) -> NDArray[np.bool_]
     return np.abs(force) > force_threshold(force, criterion.share)
 
 
-def _levels(
-    name: str, rules: Sequence[Rule], masks: dict[int, NDArray[np.bool_]], count: int
-) -> Arrays:
+def _levels(name: str, rules: Sequence[Rule], masks: dict[int, NDArray[np.bool_]]) -> Arrays:
     """Whether the run's own criterion counts a pair, and how many levels of each slider do.
 
     Levels only add or only remove pairs as they rise, so the number tells which of them count it.
@@ -239,11 +237,12 @@ def _levels(
     arrays: Arrays = {}
     for kind in ("own", "force", "gap"):
         mine = [mask for k, mask in masks.items() if rules[k].kind == kind]
-        if mine:
-            number = np.sum(mine, axis=0, dtype=np.uint8)
-            arrays[f"{name}_{kind}" + ("" if kind == "own" else "_levels")] = (
-                packed_bits(number) if kind == "own" else number
-            )
+        if not mine:
+            continue
+        if kind == "own":
+            arrays[f"{name}_own"] = packed_bits(mine[0])
+        else:
+            arrays[f"{name}_{kind}_levels"] = np.array(mine).sum(axis=0).astype(np.uint8)
     return arrays
 
 

@@ -75,7 +75,7 @@ def saved_rules(own: Choice, frame: Frame) -> list[Rule]:
         rules.append(Rule(kind="listed", choice=listed, pairs="listed", definitions=(first,)))
         if contacts.force is not None:
             rules += _slider("force", own, FORCE_THRESHOLDS)
-    held = GAP_THRESHOLDS[GAP_THRESHOLDS <= (own.reach or 0.0)]
+    held = GAP_THRESHOLDS[(own.reach or 0.0) >= GAP_THRESHOLDS]
     gaps = held if known and len(held) >= LEVELS else GAP_THRESHOLDS
     return rules + _slider("gap", own, gaps, known)
 

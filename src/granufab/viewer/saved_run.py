@@ -42,23 +42,18 @@ class SavedRun:
     """A run that is put into a page.
 
     Args:
-        viewed: the run.
         index: its place among the runs of the page.
+        viewed: the run.
         frames: the part of its frames that is wanted.
     Raises:
         InvalidSettings: there is no such frame.
         MissingData: the run has no frames.
     """
 
-    def __init__(self, viewed: ViewedRun, index: int, frames: slice) -> None:
+    def __init__(self, index: int, viewed: ViewedRun, frames: slice) -> None:
         self.viewed, self.index = viewed, index
         own = viewed.choice(None, None)
-        count = len(viewed.run.frames)
-        self.wanted = list(range(count))[frames]
-        if not self.wanted:
-            raise InvalidSettings(
-                f"frames {frames.start}:{frames.stop}: {viewed.name} holds frames 0..{count - 1}"
-            )
+        self.wanted = _chosen(viewed, frames)
         self.rules = saved_rules(own, viewed.frame(self.wanted[0]))
         self._made: dict[int, _Parts] = {}
         self._grains: dict[str, bytes] = {}
@@ -77,7 +72,9 @@ class SavedRun:
             found = [
                 data_block(f"frame-{end}", parts.frame),
                 data_block(f"states-{end}", parts.states),
-                data_block(f"changes-{end}", self._changes(place, places[row - 1] if row else None)),
+                data_block(
+                    f"changes-{end}", self._changes(place, places[row - 1] if row else None)
+                ),
             ]
             if parts.grains not in known:
                 known.add(parts.grains)
@@ -134,6 +131,18 @@ class SavedRun:
         if earlier is not None:
             interval = interval_data(earlier, after, rule.choice)
         return compressed(saved_changes(after, rule, earlier, interval))
+
+
+def _chosen(viewed: ViewedRun, frames: slice) -> list[int]:
+    """Places of the frames that a slice means, in their order."""
+    count = len(viewed.run.frames)
+    if frames.step is not None and frames.step < 1:
+        raise InvalidSettings(f"frames in steps of {frames.step}: the step must be 1 or more")
+    chosen = list(range(count))[frames]
+    if not chosen:
+        ends = ":".join("" if end is None else str(end) for end in (frames.start, frames.stop))
+        raise InvalidSettings(f"frames {ends}: {viewed.name} holds frames 0..{count - 1}")
+    return chosen
 
 
 def _in_diameters(header: dict[str, Any]) -> dict[str, float]:

@@ -15,9 +15,7 @@ def saved_words(
     saved: Sequence[SavedRun], kept: Sequence[Sequence[int]], limit: int
 ) -> tuple[str, ...]:
     """Lines for people: on the page and when it is written."""
-    lines = [
-        _frames(one, len(places), limit) for one, places in zip(saved, kept, strict=True)
-    ]
+    lines = [_frames(one, len(places), limit) for one, places in zip(saved, kept, strict=True)]
     steps: dict[str, float] = {}
     for one, places in zip(saved, kept, strict=True):
         for name, step in one.quantised(_ends(places)).items():
@@ -32,10 +30,11 @@ def _ends(places: Sequence[int]) -> list[int]:
 def _frames(one: SavedRun, kept: int, limit: int) -> str:
     count, held = len(one.wanted), len(one.viewed.run.frames)
     if kept < count:
-        thinned = f", evenly spaced, to stay below {limit / 1e6:.4g} MB"
-        return f"{one.name}: {kept} of {count} frames{thinned}; changes are between them"
-    part = "" if count == held else f", of {held}"
-    return f"{one.name}: all {count} frames{part}" if not part else f"{one.name}: {count} of {held} frames, as chosen"
+        thinned = f"evenly spaced, to stay below {limit / 1e6:.4g} MB"
+        return f"{one.name}: {kept} of {count} frames, {thinned}; changes are between them"
+    if count < held:
+        return f"{one.name}: {count} of {held} frames, as chosen; changes are between them"
+    return f"{one.name}: all {held} frames"
 
 
 def _steps(steps: dict[str, float]) -> str:

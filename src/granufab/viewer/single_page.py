@@ -6,7 +6,7 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from html import escape
 
 from granufab.errors import CorruptFile
@@ -16,7 +16,9 @@ __all__ = ["data_block", "page_parts"]
 
 _MODULES = "granufab/"
 """What names of modules begin with once they are no files: the import map knows them."""
-_IMPORT = re.compile(r"""^((?:import|export)\b[^;'"]*?\bfrom\s*|import\s*)(["'])\./""", re.MULTILINE)
+_IMPORT = re.compile(
+    r"""^((?:import|export)\b[^;'"]*?\bfrom\s*|import\s*)(["'])\./""", re.MULTILINE
+)
 _STYLE = re.compile(r'<link\b[^>]*href="/page/([\w.-]+\.css)"[^>]*>')
 _MODULE = re.compile(r'<script\b[^>]*type="module"[^>]*src="/page/([\w.-]+\.js)"[^>]*></script>')
 _SCRIPT = re.compile(r'<script\b[^>]*src="/page/([\w.-]+\.js)"[^>]*></script>')
