@@ -1,0 +1,47 @@
+// z, a', q/p and φ of the runs against ε_q, one below the other.
+
+import { theme } from "./colours.js";
+import { runColour, shortName } from "./path.js";
+
+const dash = (own) => (own ? "solid" : "dot");
+
+// The columns that at least one run has.
+function shown(series, definition) {
+  const all = [[definition, "z"], ["a_signed", "a′"], ["q_over_p", "q/p"], ["phi", "φ"]];
+  return all.filter(([name]) => series.some((run) => (run.columns[name] || []).some((value) => value !== null)));
+}
+
+export const strained = (run) => (run.columns.eps_q || []).some((value) => value !== null);
+
+export function seriesFigure({ series, view }) {
+  const columns = shown(series, view.definition);
+  if (!columns.length) return null;
+  const strain = strained(series[view.run] || series[0]);
+  const data = series.flatMap((run, k) => columns.map(([name], row) => ({
+    mode: (run.columns[name] || []).length > 1 ? "lines" : "markers",
+    x: strain ? run.columns.eps_q || [] : (run.columns[name] || []).map((_, at) => at), y: run.columns[name] || [], yaxis: row ? `y${row + 1}` : "y",
+    line: { color: runColour(k), width: k === view.run ? 1.8 : 1.1, dash: dash(k === view.run) }, name: shortName(run.name), showlegend: row === 0,
+    hovertemplate: `${strain ? "ε<sub>q</sub>" : "record"} = %{x:.4f}, ${columns[row][1]} = %{y:.4f}<extra>%{fullData.name}</extra>`,
+  })));
+  const against = strain ? "ε<sub>q</sub>" : "the record";
+  return {
+    title: `${columns.map(([, symbol]) => symbol).join(", ")} [-] against ${against}${strain ? " [-]" : ""}`,
+    keys: series.length < 2 ? [] : series.map((run, k) => ({ name: shortName(run.name), colour: runColour(k), kind: k === view.run ? "line" : "dot" })), data,
+    layout: { ...rows(columns), xaxis: { title: { text: strain ? "deviatoric strain ε<sub>q</sub> [-]" : "record" }, anchor: `y${columns.length > 1 ? columns.length : ""}` } },
+  };
+}
+
+function rows(columns) {
+  const found = {};
+  columns.forEach(([, symbol], k) => {
+    const top = 1 - k / columns.length;
+    found[`yaxis${k ? k + 1 : ""}`] = { domain: [top - 1 / columns.length + 0.035, top], title: { text: `${symbol} [-]` }, nticks: 3 };
+  });
+  return found;
+}
+
+// The line at the current frame, for pictures; the page draws it over the chart.
+export function cursorShape(eps) {
+  if (eps === null || eps === undefined) return [];
+  return [{ type: "line", xref: "x", yref: "paper", x0: eps, x1: eps, y0: 0, y1: 1, line: { color: theme().mark, width: 1.5 } }];
+}
