@@ -1,5 +1,9 @@
 // The bar of every panel: tabs, title, saving, enlarging; and what of it the address keeps.
 
+const TABS = [
+  ["rose", "E(θ)", "rose of the contact directions"], ["surface", "E(n)", "surface of the contact directions"],
+  ["changes", "gain, loss", "contacts gained and lost by direction"],
+];
 const BUTTONS = [["svg", "save as SVG"], ["png", "save as PNG"]];
 
 function button(words, label, more) {
@@ -33,8 +37,8 @@ function tabs(act) {
   const list = document.createElement("span");
   list.setAttribute("role", "tablist");
   list.className = "tabs";
-  for (const [name, words] of [["rose", "E(θ)"], ["surface", "E(n)"], ["changes", "gain, loss"]]) {
-    const tab = button(words, { rose: "rose of the contact directions", surface: "surface of the contact directions", changes: "contacts gained and lost by direction" }[name], { onclick: () => act.tab(name) });
+  for (const [name, words, label] of TABS) {
+    const tab = button(words, label, { onclick: () => act.tab(name) });
     tab.setAttribute("role", "tab");
     tab.dataset.tab = name;
     list.append(tab);

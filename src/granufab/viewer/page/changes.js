@@ -21,13 +21,17 @@ export function changesFigure({ interval }) {
   const data = [
     step(interval.gain, "gained", colours.gain), step(interval.loss, "lost", colours.loss),
     {
-      mode: "lines+markers", x: edges.map((edge) => DEGREE * edge), y: interval.current, name: "current to larger θ", line: { color: colours.soft, width: 1.2, dash: "dot" },
+      mode: "lines+markers", x: edges.map((edge) => DEGREE * edge), y: interval.current, name: "current to larger θ",
+      line: { color: colours.soft, width: 1.2, dash: "dot" },
       marker: { size: 5, color: colours.soft }, hovertemplate: "θ = %{x:.0f}°, %{y}<extra>current</extra>",
     },
   ];
   return {
     title: "Contacts gained, lost per bin [count] by θ [°]", data,
-    keys: [{ name: "gained", colour: colours.gain, kind: "line" }, { name: "lost", colour: colours.loss, kind: "line" }, { name: "current to larger θ", colour: colours.soft, kind: "dot" }],
+    keys: [
+      { name: "gained", colour: colours.gain, kind: "line" }, { name: "lost", colour: colours.loss, kind: "line" },
+      { name: "current to larger θ", colour: colours.soft, kind: "dot" },
+    ],
     layout: {
       xaxis: { title: { text: "θ from the contraction axis [°]" }, range: [0, DEGREE * edges[edges.length - 1]], dtick: 30 },
       yaxis: { title: { text: "contacts per bin [count]" }, nticks: 6, zeroline: true, zerolinecolor: colours.soft },
@@ -40,5 +44,6 @@ export function changesWords({ interval }) {
   if (interval.missing) return interval.missing;
   const { gained, lost, persistent, z_before, z_after, z_gain, z_loss } = interval;
   const since = interval.since_eps_q === null ? "" : ` since ε_q = ${interval.since_eps_q.toFixed(4)}`;
-  return `${gained} gained, ${lost} lost, ${persistent} persistent${since}; z of all grains ${z_before.toFixed(3)} → ${z_after.toFixed(3)}: gain ${signed(z_gain)}, loss ${signed(z_loss)}`;
+  const parts = `z of all grains ${z_before.toFixed(3)} → ${z_after.toFixed(3)}: gain ${signed(z_gain)}, loss ${signed(z_loss)}`;
+  return `${gained} gained, ${lost} lost, ${persistent} persistent${since}; ${parts}`;
 }

@@ -1,7 +1,7 @@
 // Charts by plotly: the theme, one way to draw a figure into its place, and pictures of it.
 // A figure is {title, keys, data, layout}; the page writes title and keys, pictures carry both inside.
 
-import { theme } from "./colours.js";
+import { CYCLE, theme } from "./colours.js";
 
 const { Plotly } = window;
 const CONFIG = { displayModeBar: false, responsive: false, doubleClick: "reset" };
@@ -11,6 +11,12 @@ const watched = new WeakSet();
 
 // A colour of the style sheet that charts alone use.
 export const tint = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+// The colours of the runs; lighter ones on dark.
+const ON_DARK = ["#56B4E9", "#E69F00", "#2CC295", "#CC79A7", "#F0E442", "#FF8C69"];
+export function runColour(k) {
+  const cycle = document.documentElement.classList.contains("dark") ? ON_DARK : CYCLE;
+  return cycle[k % cycle.length];
+}
 export const letters = () => Math.max(parseFloat(getComputedStyle(document.documentElement).fontSize) - 1, 12);
 
 function dressed(more, size) {

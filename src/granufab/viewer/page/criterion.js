@@ -8,8 +8,12 @@ export function criterionText(name) {
   return KINDS[kind] ? `${KINDS[kind][0]} ${short(Number(number))}` : name;
 }
 
-const short = (value) => (value !== 0 && (value < 0.001 || value >= 1e4) ? value.toExponential(1).replace("e-", "·10^−").replace(/\^(−?\d+)/, (_, power) => raised(power)) : String(Number(value.toPrecision(3))));
-const raised = (text) => [...text].map((letter) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["−0123456789".indexOf(letter)]).join("");
+// A number of three digits, small ones with their power of ten.
+function short(value) {
+  if (value === 0 || value >= 0.001) return String(Number(value.toPrecision(3)));
+  const [digits, power] = value.toExponential(1).split("e-");
+  return `${digits}·10⁻${[...power].map((letter) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[letter]).join("")}`;
+}
 
 export const meaning = (kind) => (KINDS[kind] ? KINDS[kind][1] : "");
 

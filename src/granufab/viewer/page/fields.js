@@ -26,6 +26,7 @@ export function fillRuns(listed) {
   $("run").replaceChildren(...listed.map(({ run, name }) => new Option(name.split("/").slice(-3).join("/"), run)));
   view.run = Math.min(Math.max(view.run, 0), listed.length - 1);
   $("run").value = view.run;
+  $("run").title = listed.map(({ name }) => name).join("\n");
 }
 
 // In a saved file only some criteria and definitions are held: the others cannot be chosen.

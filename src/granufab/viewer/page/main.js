@@ -15,7 +15,10 @@ import { Failure, openSource } from "./source.js";
 import { isDark, remember, restore, view } from "./view.js";
 
 const source = openSource();
-const known = { listed: [], overview: null, series: [], fitted: null, domain: null, state: null, interval: null, curves: null, held: null, version: 0, eps: null, view };
+const known = {
+  listed: [], overview: null, series: [], fitted: null, domain: null, state: null, interval: null, curves: null, held: null,
+  version: 0, count: 0, eps: null, view,
+};
 const data = document.documentElement.dataset;
 const said = { lost: "", frame: "" };
 
@@ -69,7 +72,7 @@ async function drawFrame(run, frame) {
   const asked = choice(view, curves);
   const interval = view.tab === "changes" ? intervalOf(run, frame, asked) : null;
   const [packed, state] = await Promise.all([source.packing(run, frame, asked), source.state(run, frame, asked)]);
-  Object.assign(known, { state, curves, eps: known.overview.frames.eps_q[frame], interval: await interval });
+  Object.assign(known, { count: known.count + 1, state, curves, eps: known.overview.frames.eps_q[frame], interval: await interval });
   packing.show(packed);
   $("legend").textContent = packing.legend;
   $("place").textContent = frameWords(known.overview, frame);

@@ -1,6 +1,7 @@
 // The Mohr circle of G between the two isotropic limit states of the domain.
 
-import { CYCLE, theme } from "./colours.js";
+import { runColour } from "./charts.js";
+import { theme } from "./colours.js";
 
 const turn = Array.from({ length: 121 }, (_, k) => (2 * Math.PI * k) / 120);
 const circle = ([centre, radius], more) => ({
@@ -28,7 +29,7 @@ export function mohrFigure({ state, domain }) {
     });
   }
   (state.mohr ? state.mohr.circles : []).forEach((one, k) => data.push(circle(one, {
-    line: { color: CYCLE[0], width: k ? 1 : 2.5 }, name: "this state", showlegend: !k,
+    line: { color: runColour(0), width: k ? 1 : 2.5 }, name: "this state", showlegend: !k,
     hovertemplate: `centre ${one[0].toFixed(4)}, radius ${one[1].toFixed(4)}<extra></extra>`,
   })));
   return {
@@ -43,7 +44,7 @@ export function mohrFigure({ state, domain }) {
 function keys(domain, state) {
   const colours = theme();
   return [
-    ...(state.mohr ? [{ name: "this state", colour: CYCLE[0], kind: "line" }] : []),
+    ...(state.mohr ? [{ name: "this state", colour: runColour(0), kind: "line" }] : []),
     ...(domain ? [{ name: "critical state", colour: colours.soft, kind: "dash" }, { name: "isotropic limits", colour: colours.ink, kind: "point" }] : []),
   ];
 }

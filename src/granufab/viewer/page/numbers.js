@@ -3,7 +3,10 @@
 export function showNumbers(place, state) {
   const { values } = state;
   const signed = values.a_signed !== null && values.a_signed !== undefined;
-  const named = [["z", state.z_definition], [signed ? "a′" : "a", signed ? "a_signed" : "a"], ["rattlers", "rattler_fraction"], ["q/p", "q_over_p"], ["φ", "phi"], ["contacts", "contact_count"]];
+  const named = [
+    ["z", state.z_definition], signed ? ["a′", "a_signed"] : ["a", "a"], ["rattlers", "rattler_fraction"],
+    ["q/p", "q_over_p"], ["φ", "phi"], ["contacts", "contact_count"],
+  ];
   place.replaceChildren(...named.map(([text, name]) => {
     const span = document.createElement("span");
     const value = values[name] ?? null;
@@ -18,7 +21,7 @@ export function showNumbers(place, state) {
 
 function written(value, name) {
   if (value === null) return "?";
-  return Number.isInteger(value) && name.endsWith("count") ? String(value) : value.toFixed(4);
+  return Number.isInteger(value) && name.endsWith("count") ? String(value) : value.toFixed(4).replace("-", "−");
 }
 
 export function frameWords(overview, place) {

@@ -11,7 +11,8 @@ import { cursorShape, seriesFigure, strained } from "./series.js";
 import { SurfaceView } from "./surface.js";
 
 const $ = (id) => document.getElementById(id);
-const NAMES = ["rose", "mohr", "path", "series", "changes"];
+const HEADS = { rose: "Rose E(θ)", mohr: "Mohr circle of the fabric G", path: "Path and domain", series: "Series", changes: "Contacts gained, lost" };
+const NAMES = Object.keys(HEADS);
 
 export class Panels {
   // `known` is everything that is shown, `act` what a panel asks for: {tab, limits, jump, settled}.
@@ -41,7 +42,7 @@ export class Panels {
   // Draws a figure unless `key` says that it stands already; a reason where there is none.
   async chart(name, figure, key, reason, after = () => {}) {
     const place = $(`${name}-chart`);
-    if (key !== null && this.drawn[name] === key) { after(); return; }
+    if (this.drawn[name] === key) { after(); return; }
     this.drawn[name] = key;
     const made = figure(this.known);
     this.figures[name] = made;
@@ -49,7 +50,7 @@ export class Panels {
     section.classList.toggle("empty", !made);
     section.querySelector(".reason").textContent = made ? "" : reason;
     for (const button of section.querySelectorAll("button.save")) button.disabled = !made;
-    if (!made) return;
+    if (!made) { titled(section, HEADS[name]); return; }
     titled(section, made.head || made.title);
     keyed(section.querySelector(".keyrow"), made.keys);
     await put(place, made, after);
@@ -60,7 +61,7 @@ export class Panels {
     const solid = Boolean(state.rose && state.rose.surface);
     $("rose").classList.toggle("surface", this.view.tab === "surface" && solid);
     if (this.view.tab !== "surface" || !solid) {
-      await this.chart("rose", roseFigure, null, state.missing || "no contacts, so no E(θ)");
+      await this.chart("rose", roseFigure, String(this.known.count), lacking(state));
       return;
     }
     $("rose").classList.remove("empty");
@@ -72,8 +73,8 @@ export class Panels {
   surfaceTitle() { return `Surface E(n) [${unit(this.known.state.rose)}], harmonics to order 6`; }
 
   async mohr() {
-    const { state } = this.known;
-    await this.chart("mohr", mohrFigure, null, state.missing || "no contacts, so no fabric tensor");
+    const { state, count, domain } = this.known;
+    await this.chart("mohr", mohrFigure, JSON.stringify([count, domain && [domain.z_min, domain.z_max]]), lacking(state));
   }
 
   async path() {
@@ -107,9 +108,10 @@ export class Panels {
       const interval = !own && fitted.intervals && fitted.intervals[name];
       return `${name} = ${domain[name].toFixed(3)}${interval && interval[0] !== null ? ` [${interval.map((z) => z.toFixed(3)).join(", ")}]` : ""}`;
     };
-    $("limits").textContent = domain ? `${limit("z_min")}, ${limit("z_max")}${own ? ` (fitted ${fitted.z_min.toFixed(3)}, ${fitted.z_max.toFixed(3)})` : ""}` : "no domain";
+    $("limits").textContent = domain ? `${limit("z_min")}, ${limit("z_max")}${own ? ` (fitted ${fitted.z_min.toFixed(3)}, ${fitted.z_max.toFixed(3)})` : ""}` : "";
     $("limits").title = domain ? "limits of the accessible domain [interval of 95 %]" : this.known.fitMissing || "";
-    $("where").textContent = domain ? where(domain, state.point) : this.known.fitMissing || "";
+    $("where").textContent = domain ? where(domain, state.point) : `no domain: ${this.known.fitMissing || "nothing is fitted"}`;
+    $("where").parentElement.classList.toggle("none", !domain);
     $("where").title = $("where").textContent;
     $("fitted").hidden = !own;
   }
@@ -139,7 +141,7 @@ export class Panels {
 
   async changes() {
     const words = changesWords(this.known);
-    await this.chart("changes", changesFigure, null, words || "asked for …");
+    await this.chart("changes", changesFigure, String(this.known.count), words || "asked for …");
     $("changes-words").textContent = $("changes").classList.contains("empty") ? "" : words;
     $("changes-words").title = words;
   }
@@ -178,6 +180,13 @@ export class Panels {
 
   // Everything is drawn anew: the theme or the size of the letters has changed.
   stale() { this.drawn = {}; }
+}
+
+// Why a state has neither rose nor Mohr circle.
+function lacking(state) {
+  const { rattler_fraction: rattlers, contact_count: count } = state.values;
+  if (count === 0) return "there are no contacts under this criterion";
+  return rattlers === 1 ? "every grain is a rattler under this criterion, so no contact counts" : state.missing || "there are no contacts";
 }
 
 function titled(section, text) {

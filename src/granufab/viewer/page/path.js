@@ -1,9 +1,8 @@
 // The path of the runs in (z, a') or (z, a'z), the accessible domain, and where the states lie.
 
-import { tint } from "./charts.js";
-import { CYCLE, theme } from "./colours.js";
+import { runColour, tint } from "./charts.js";
+import { theme } from "./colours.js";
 
-export const runColour = (k) => CYCLE[k % CYCLE.length];
 export const shortName = (name) => name.split("/").slice(-3).join("/").replace(/\/run\.h5$/, "");
 const times = (a, z) => a.map((value, k) => (value === null || z[k] === null ? null : value * z[k]));
 
@@ -14,7 +13,7 @@ export function pathFigure(context) {
   const scaled = view.plane === "az";
   const found = marks(context);
   const sides = usedSides(domain, found, series);
-  const data = [...areas(sides, scaled), ...runTraces(series, scaled, view.definition), ...stars(sides, scaled), unseen(found)];
+  const data = [...areas(sides, scaled), ...runTraces(series, scaled, view.definition), ...stars(sides, scaled), unseen(found, series, view.definition, scaled)];
   return {
     head: "Path and domain", title: `Path and domain (z [-], ${scaled ? "a′z" : "a′"} [-])`, keys: keys(series, domain, fitted, view.definition), data,
     layout: {
@@ -33,12 +32,22 @@ function usedSides(domain, found, series) {
   return domain.sides.filter((side) => side.sign > 0 || both);
 }
 
-// The states, unseen, so that the axes reach them; rings over the chart show them.
-const unseen = (found) => ({ mode: "markers", x: found.map((one) => one.z), y: found.map((one) => one.y), marker: { opacity: 0, size: 12 }, hoverinfo: "skip", showlegend: false });
+// The states, which rings over the chart show, and the ends of the runs: unseen, so that the axes reach beyond them.
+function unseen(found, series, definition, scaled) {
+  const points = found.map((one) => [one.z, one.y]);
+  for (const { columns } of series) {
+    const [z, a] = [columns[definition], columns.a_signed];
+    const known = z && a ? z.map((value, k) => [value, a[k] === null || !scaled ? a[k] : a[k] * value]).filter(([x, y]) => x !== null && y !== null) : [];
+    for (const axis of known.length ? [0, 1] : []) {
+      points.push(known.reduce((best, one) => (one[axis] < best[axis] ? one : best)), known.reduce((best, one) => (one[axis] > best[axis] ? one : best)));
+    }
+  }
+  return { mode: "markers", x: points.map(([x]) => x), y: points.map(([, y]) => y), marker: { opacity: 0, size: 14 }, hoverinfo: "skip", showlegend: false };
+}
 
 function keys(series, domain, fitted, definition) {
   const colours = theme();
-  const drawn = series.map((run, k) => ({ name: shortName(run.name), colour: runColour(k), kind: "line", shown: run.columns[definition] && run.columns.a_signed }));
+  const drawn = series.map((run, k) => ({ name: shortName(run.name), colour: runColour(k), kind: "line", shown: (run.columns.a_signed || []).some((a) => a !== null) && run.columns[definition] }));
   return [
     { name: "this state", colour: colours.mark, kind: "ring" }, ...drawn.filter((one) => one.shown),
     ...(domain ? [{ name: "accessible", colour: colours.soft, kind: "dash" }, { name: "critical", colour: "#f7d84a", kind: "star" }] : []),
@@ -62,7 +71,8 @@ function runTraces(series, scaled, definition) {
     const [z, a] = [run.columns[definition], run.columns.a_signed];
     if (!z || !a) return [];
     return [{
-      mode: z.length > 1 ? "lines" : "markers", x: z, y: scaled ? times(a, z) : a, line: { color: runColour(k), width: 1.5 }, marker: { color: runColour(k), size: 6 },
+      mode: z.length > 1 ? "lines" : "markers", x: z.map((value, at) => (a[at] === null ? null : value)), y: scaled ? times(a, z) : a,
+      line: { color: runColour(k), width: 1.5 }, marker: { color: runColour(k), size: 6 },
       name: shortName(run.name), hovertemplate: "z = %{x:.3f}, %{y:.3f}<extra>%{fullData.name}</extra>",
     }];
   });

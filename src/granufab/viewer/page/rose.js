@@ -1,7 +1,7 @@
 // The rose E(θ): bins with error bars, the fit and its band of one standard error.
 
-import { tint } from "./charts.js";
-import { CYCLE, theme } from "./colours.js";
+import { runColour, tint } from "./charts.js";
+import { theme } from "./colours.js";
 
 // Points that some angles repeat over the whole turn, [degree] and values in order.
 function around(rose, theta, values) {
@@ -25,7 +25,7 @@ export function roseFigure({ state }) {
 }
 
 const keys = (rose) => [
-  { name: "bins ± 1 σ", colour: CYCLE[0], kind: "point" }, { name: `fit ± 1 σ, a = ${rose.a.toFixed(3)} ± ${rose.a_error.toFixed(3)} [-]`, colour: CYCLE[0], kind: "line" },
+  { name: "bins ± 1 σ", colour: runColour(0), kind: "point" }, { name: `fit ± 1 σ, a = ${rose.a.toFixed(3)} ± ${rose.a_error.toFixed(3)} [-]`, colour: runColour(0), kind: "line" },
 ];
 
 function traces(rose) {
@@ -40,13 +40,13 @@ function traces(rose) {
   return [
     line(low.map((value) => Math.max(value, 0)), { line: { width: 0 }, showlegend: false }),
     line(high, { line: { width: 0 }, fill: "tonext", name: "error of the fit", fillcolor: tint("band") }),
-    line(fit, { name: `second-order fit, a = ${rose.a.toFixed(3)} ± ${rose.a_error.toFixed(3)}`, line: { color: CYCLE[0], width: 2 } }),
+    line(fit, { name: `second-order fit, a = ${rose.a.toFixed(3)} ± ${rose.a_error.toFixed(3)}`, line: { color: runColour(0), width: 2 } }),
     {
       type: "scatterpolar", mode: "lines", showlegend: false, theta: dots.flatMap((t) => [t, t, null]), hoverinfo: "skip",
       r: values.flatMap((v, k) => [Math.max(v - errors[k], 0), v + errors[k], null]), line: { color: colours.soft, width: 1 },
     },
     {
-      type: "scatterpolar", mode: "markers", name: "contacts, ± one standard error", theta: dots, r: values, marker: { size: 4, color: colours.panel, line: { color: CYCLE[0], width: 1.2 } },
+      type: "scatterpolar", mode: "markers", name: "contacts, ± one standard error", theta: dots, r: values, marker: { size: 4, color: colours.panel, line: { color: runColour(0), width: 1.2 } },
       hovertemplate: `θ = %{theta:.0f}°<br>E = %{r:.3f} ${unit(rose)}<extra></extra>`,
     },
   ];

@@ -1,7 +1,8 @@
 // z, a', q/p and φ of the runs against ε_q, one below the other.
 
+import { runColour } from "./charts.js";
 import { theme } from "./colours.js";
-import { runColour, shortName } from "./path.js";
+import { shortName } from "./path.js";
 
 const dash = (own) => (own ? "solid" : "dot");
 
@@ -27,8 +28,13 @@ export function seriesFigure({ series, view }) {
   return {
     title: `${columns.map(([, symbol]) => symbol).join(", ")} [-] against ${against}${strain ? " [-]" : ""}`,
     keys: series.length < 2 ? [] : series.map((run, k) => ({ name: shortName(run.name), colour: runColour(k), kind: k === view.run ? "line" : "dot" })), data,
-    layout: { ...rows(columns), xaxis: { title: { text: strain ? "deviatoric strain ε<sub>q</sub> [-]" : "record" }, anchor: `y${columns.length > 1 ? columns.length : ""}` } },
+    layout: { ...rows(columns), xaxis: { ...across(strain, data), anchor: `y${columns.length > 1 ? columns.length : ""}` } },
   };
+}
+
+function across(strain, data) {
+  if (strain) return { title: { text: "deviatoric strain ε<sub>q</sub> [-]" } };
+  return { title: { text: "record" }, tickformat: "d", dtick: data.every((one) => one.x.length < 9) ? 1 : undefined };
 }
 
 function rows(columns) {

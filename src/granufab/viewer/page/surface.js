@@ -151,7 +151,10 @@ function written(rose, turn, wide, high, title) {
   const parts = items.map((item) => (item.axis
     ? `<polyline points="${at([0, 0])} ${at(item.end)}" stroke="${colours.ink}"/>${text(at(item.end.map((value) => 1.09 * value)), item.axis)}`
     : `<polygon points="${item.corners.map(at).join(" ")}" fill="${item.colour}" stroke="${item.colour}"/>`));
-  rising.forEach((colour, k) => parts.push(`<rect x="${0.2 * wide + (0.6 * wide * k) / rising.length}" y="${high - 28}" width="${(0.6 * wide) / rising.length + 0.5}" height="8" fill="${colour}"/>`));
+  const step = (0.6 * wide) / rising.length;
+  rising.forEach((colour, k) => parts.push(`<rect x="${0.2 * wide + step * k}" y="${high - 28}" width="${step + 0.5}" height="8" fill="${colour}"/>`));
   steps(least, most).forEach((words, k) => parts.push(text(`${wide * (0.2 + 0.3 * k)},${high - 10}`, words + (k === 2 ? ` ${unit(rose)}` : ""))));
-  return `<svg xmlns="http://www.w3.org/2000/svg" width="${wide}" height="${high}" viewBox="0 0 ${wide} ${high}" font-family="system-ui, DejaVu Sans, sans-serif" font-size="14" fill="${colours.ink}" stroke-width="0.6"><rect width="${wide}" height="${high}" fill="${colours.back}"/>${text("14,22", title, "start")}${parts.join("")}</svg>`;
+  const font = `font-family="system-ui, DejaVu Sans, sans-serif" font-size="14" fill="${colours.ink}" stroke-width="0.6"`;
+  const back = `<rect width="${wide}" height="${high}" fill="${colours.back}"/>`;
+  return `<svg xmlns="http://www.w3.org/2000/svg" width="${wide}" height="${high}" viewBox="0 0 ${wide} ${high}" ${font}>${back}${text("14,22", title, "start")}${parts.join("")}</svg>`;
 }
