@@ -69,6 +69,7 @@ const showFrame = latest(async () => {
 
 async function drawFrame(run, frame) {
   const curves = slides(view) ? await source.criterion(run, frame, choice(view, null)) : null;
+  fitLevel(curves);
   const asked = choice(view, curves);
   const interval = view.tab === "changes" ? intervalOf(run, frame, asked) : null;
   const [packed, state] = await Promise.all([source.packing(run, frame, asked), source.state(run, frame, asked)]);
@@ -85,6 +86,15 @@ async function drawFrame(run, frame) {
   data.shown = `${run}/${frame}/${state.criterion}`;
 }
 
+// Saved files hold fewer levels: one beyond them becomes the middle one.
+function fitLevel(curves) {
+  const curve = curves && curves[view.kind];
+  if (!curve) return;
+  if (view.level >= curve.threshold.length) view.level = Math.floor(curve.threshold.length / 2);
+  $("threshold").max = curve.threshold.length - 1;
+  $("threshold").value = view.level;
+}
+
 async function intervalOf(run, frame, asked) {
   try {
     return await source.interval(run, frame, asked);
@@ -97,7 +107,6 @@ async function intervalOf(run, frame, asked) {
 function showCriterion(state) {
   const curve = slides(view) && known.curves ? known.curves[view.kind] : null;
   $("threshold").hidden = !curve;
-  if (curve) $("threshold").max = curve.threshold.length - 1;
   $("threshold").setAttribute("aria-valuetext", criterionText(state.criterion));
   $("criterion").textContent = criterionText(state.criterion);
   $("criterion").title = meaning(view.kind);

@@ -13,7 +13,7 @@ export function pathFigure(context) {
   const scaled = view.plane === "az";
   const found = marks(context);
   const sides = usedSides(domain, found, series);
-  const data = [...areas(sides, scaled), ...runTraces(series, scaled, view.definition), ...stars(sides, scaled), unseen(found, series, view.definition, scaled)];
+  const data = [...areas(sides, scaled), ...runTraces(series, scaled, view.definition), ...stars(sides, scaled), unseen([...found, ...corners(domain)], series, view.definition, scaled)];
   return {
     head: "Path and domain", title: `Path and domain (z [-], ${scaled ? "a′z" : "a′"} [-])`, keys: keys(series, domain, fitted, view.definition), data,
     layout: {
@@ -32,7 +32,9 @@ function usedSides(domain, found, series) {
   return domain.sides.filter((side) => side.sign > 0 || both);
 }
 
-// The states, which rings over the chart show, and the ends of the runs: unseen, so that the axes reach beyond them.
+const corners = (domain) => (domain ? [{ z: domain.z_min, y: 0 }, { z: domain.z_max, y: 0 }] : []);
+
+// The states, which rings over the chart show, and the ends of domain and runs: unseen, so that the axes reach beyond them.
 function unseen(found, series, definition, scaled) {
   const points = found.map((one) => [one.z, one.y]);
   for (const { columns } of series) {
