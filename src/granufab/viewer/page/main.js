@@ -81,7 +81,8 @@ async function drawFrame(run, frame) {
   showCriterion(state);
   await panels.draw();
   const lacking = slides(view) && !(curves && curves[view.kind]) ? `no ${view.kind} in these data, so the criterion stays ${criterionText(state.criterion)}` : "";
-  told("frame", lacking || state.missing || packed.header.missing || known.overview.problem);
+  const { problem } = known.listed[run];
+  told("frame", problem || lacking || state.missing || packed.header.missing);
   data.drawn = packing.drawn.toFixed(1); // ms, for whoever measures
   data.shown = `${run}/${frame}/${state.criterion}`;
 }

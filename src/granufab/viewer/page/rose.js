@@ -1,6 +1,6 @@
 // The rose E(θ): bins with error bars, the fit and its band of one standard error.
 
-import { runColour, tint } from "./charts.js";
+import { letters, runColour, tint } from "./charts.js";
 import { theme } from "./colours.js";
 
 // Points that some angles repeat over the whole turn, [degree] and values in order.
@@ -58,10 +58,13 @@ function layout(rose) {
     margin: { l: 34, r: 34, t: 22, b: 22 },
     polar: {
       bgcolor: "rgba(0,0,0,0)",
-      radialaxis: { gridcolor: colours.line, linecolor: colours.soft, angle: 0, tickangle: 0, side: "clockwise", rangemode: "tozero", nticks: 4, tickfont: { size: 11 } },
+      radialaxis: {
+        gridcolor: colours.line, linecolor: colours.soft, angle: 0, tickangle: 0, side: "clockwise", rangemode: "tozero", nticks: 4,
+        tickfont: { size: letters() - 1 },
+      },
       angularaxis: {
         gridcolor: colours.line, linecolor: colours.soft, rotation: rose.axis ? 90 : 0, direction: rose.axis ? "clockwise" : "counterclockwise",
-        tickfont: { size: 11 }, dtick: 45,
+        tickfont: { size: letters() - 1 }, dtick: 45,
       },
     },
   };

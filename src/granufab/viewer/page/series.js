@@ -14,7 +14,7 @@ function shown(series, definition) {
 
 export const strained = (run) => (run.columns.eps_q || []).some((value) => value !== null);
 
-export function seriesFigure({ series, view }) {
+export function seriesFigure({ series, overview, view }) {
   const columns = shown(series, view.definition);
   if (!columns.length) return null;
   const strain = strained(series[view.run] || series[0]);
@@ -28,12 +28,18 @@ export function seriesFigure({ series, view }) {
   return {
     title: `${columns.map(([, symbol]) => symbol).join(", ")} [-] against ${against}${strain ? " [-]" : ""}`,
     keys: series.length < 2 ? [] : series.map((run, k) => ({ name: shortName(run.name), colour: runColour(k), kind: k === view.run ? "line" : "dot" })), data,
-    layout: { ...rows(columns), xaxis: { ...across(strain, data), anchor: `y${columns.length > 1 ? columns.length : ""}` } },
+    layout: { ...rows(columns), xaxis: { ...across(strain, data, overview.frames.eps_q), anchor: `y${columns.length > 1 ? columns.length : ""}` } },
   };
 }
 
-function across(strain, data) {
-  if (strain) return { title: { text: "deviatoric strain ε<sub>q</sub> [-]" } };
+// The axis of all rows, from the first record or frame to the last.
+function across(strain, data, frames) {
+  if (strain) {
+    const known = [...frames, ...data.flatMap((one) => one.x)].filter((value) => value !== null);
+    const [low, high] = known.reduce(([least, most], one) => [Math.min(least, one), Math.max(most, one)], [Infinity, -Infinity]);
+    const room = 0.01 * (high - low || 0.01);
+    return { title: { text: "deviatoric strain ε<sub>q</sub> [-]" }, range: [low - room, high + room] };
+  }
   return { title: { text: "record" }, tickformat: "d", dtick: data.every((one) => one.x.length < 9) ? 1 : undefined };
 }
 
