@@ -144,7 +144,15 @@ export class PackingView {
 
   // ---- drawing, at rest and while it moves
 
-  resized() { if (this.world) this.still(); }
+  resized() { this.snapped(); if (this.world) this.still(); }
+
+  // The canvas on whole pixels of the page, lest the browser smear them.
+  snapped() {
+    const box = this.canvas.parentElement.getBoundingClientRect();
+    const [left, top] = [Math.ceil(box.left), Math.ceil(box.top)];
+    const size = { left: left - box.left, top: top - box.top, width: Math.floor(box.right) - left, height: Math.floor(box.bottom) - top };
+    for (const [name, value] of Object.entries(size)) this.canvas.style[name] = `${Math.max(value, 0)}px`;
+  }
 
   still() { clearTimeout(this.resting); this.render(1); }
 
