@@ -19,21 +19,22 @@ export class CanvasRenderer {
   }
 
   setUp() {}
+  get smooths() { return Boolean(this.world) && !this.world.flat; }
   load(world) { this.world = world; }
   paint(shade) { this.shade = shade; }
   stroke(name, found) { this.strokes[name] = found; }
 
-  draw(camera, look, coarse = 1) {
+  draw(camera, look, coarse = 1, quick = false) {
     const ratio = (devicePixelRatio || 1) * coarse;
     const size = camera.size.map((value) => Math.max(Math.round(value * ratio), 1));
     if (this.canvas.width !== size[0]) this.canvas.width = size[0];
     if (this.canvas.height !== size[1]) this.canvas.height = size[1];
-    this.into(this.canvas, camera, look, !this.world || this.world.flat || coarse < 1 ? 1 : FINER);
+    this.into(this.canvas, camera, look, this.smooths && coarse === 1 && !quick ? FINER : 1);
   }
 
   picture(camera, look) {
     const canvas = Object.assign(document.createElement("canvas"), { width: Math.round(camera.size[0]), height: Math.round(camera.size[1]) });
-    this.into(canvas, camera, look, this.world.flat ? 1 : FINER);
+    this.into(canvas, camera, look, this.smooths ? FINER : 1);
     return canvas;
   }
 

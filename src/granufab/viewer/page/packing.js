@@ -129,7 +129,7 @@ export class PackingView {
     this.key = drawnLegend(this.shade, lineKey(this.data, this.options.lines), colours);
     const scale = this.section.querySelector("#scale");
     if (scale) scale.innerHTML = this.key;
-    this.still();
+    this.atOnce();
   }
 
   // How the grains look: fainter, and small among spheres, where lines are to be seen.
@@ -138,36 +138,51 @@ export class PackingView {
     const lined = this.lines && this.lines.count > 0;
     return {
       back: colours.panel, rim: colours.rim, tones: TONES.map((name) => colours[name]), away: world.flat ? 0.45 : 0.7, dim: lined ? (world.flat ? 0.45 : 0.3) : 0,
-      shrink: lined && !world.flat ? 0.4 : 1, fog: world.flat ? 0 : 0.55, perPixel: this.camera.scale,
+      shrink: lined && !world.flat ? 0.3 : 1, fog: world.flat ? 0 : 0.55, perPixel: this.camera.scale,
     };
   }
 
   // ---- drawing, at rest and while it moves
 
-  resized() { if (this.world) this.still(); }
+  resized() { this.snapped(); if (this.world) this.still(); }
+
+  // The canvas on whole pixels of the page, lest the browser smear them.
+  snapped() {
+    const box = this.canvas.parentElement.getBoundingClientRect();
+    const [left, top] = [Math.ceil(box.left), Math.ceil(box.top)];
+    const size = { left: left - box.left, top: top - box.top, width: Math.floor(box.right) - left, height: Math.floor(box.bottom) - top };
+    for (const [name, value] of Object.entries(size)) this.canvas.style[name] = `${Math.max(value, 0)}px`;
+  }
 
   still() { clearTimeout(this.resting); this.render(1); }
+
+  // A picture at once, smoothed when it stays for a while: frames follow one another quickly.
+  atOnce() {
+    clearTimeout(this.resting);
+    this.render(1, true);
+    if (this.drawer.smooths) this.resting = setTimeout(() => this.still(), REST);
+  }
 
   moved() {
     if (this.asked || !this.world) return;
     this.asked = requestAnimationFrame(() => {
       this.asked = null;
       const spent = this.render(this.coarse);
-      if (spent > SLOW) this.coarse = Math.max(this.coarse * 0.75, COARSEST);
+      if (spent > SLOW) this.coarse = Math.max(this.coarse * Math.max(Math.sqrt(0.7 * SLOW / spent), 0.4), COARSEST);
       else if (spent < QUICK && this.coarse < 1) this.coarse = Math.min(this.coarse / 0.75, 1);
       clearTimeout(this.resting);
       if (this.coarse < 1) this.resting = setTimeout(() => this.still(), REST);
     });
   }
 
-  render(coarse) {
+  render(coarse, quick = false) {
     const [wide, high] = [this.canvas.clientWidth, this.canvas.clientHeight];
     if (!this.world || !wide || !high || this.lost) return 0;
     const started = performance.now();
     this.camera.size = [wide, high];
     const look = this.look();
     this.marked(look);
-    this.drawer.draw(this.camera, look, coarse);
+    this.drawer.draw(this.camera, look, coarse, quick);
     this.spent = performance.now() - started;
     return this.spent;
   }

@@ -86,7 +86,10 @@ export function words(data, mark, place) {
   return (mark.grain === undefined ? contactWords(data, mark, place) : grainWords(data, mark, place)).join(" · ");
 }
 
-const number = (value) => String(Number(value.toPrecision(3))).replace("-", "−");
+const number = (value) => {
+  const short = Number(value.toPrecision(3));
+  return (short && Math.abs(short) < 1e-3 ? short.toExponential() : String(short)).replace(/-/g, "−");
+};
 
 function grainWords(data, mark, { grain: k }) {
   if (k < 0) return [`grain ${mark.grain}`, "not in this frame"];

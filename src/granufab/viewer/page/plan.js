@@ -28,9 +28,15 @@ export function plan(world, shade, strokes, camera, look) {
       for (const group of slab.lines.values()) groups.push({ ...group, tint: far });
     });
   }
-  const over = Array.from({ length: 1 }, () => ({ disks: new Map(), lines: new Map() }));
-  for (const name of ["over", "marks"]) lines({ ...world, flat: true }, strokes[name], view, [0, 0, 0], over);
-  for (const group of over[0].lines.values()) groups.push({ ...group, tint: 0, over: true });
+  // The cell behind the spheres, for a line has no depth here; marks before all.
+  const flat = { ...world, flat: true };
+  for (const name of ["over", "marks"]) {
+    const found = [{ lines: new Map() }];
+    lines(flat, strokes[name], view, [0, 0, 0], found);
+    const drawn = [...found[0].lines.values()].map((group) => ({ ...group, tint: 0, over: world.flat || name === "marks" }));
+    if (name === "over" && !world.flat) groups.unshift(...drawn);
+    else groups.push(...drawn);
+  }
   return groups;
 }
 
