@@ -91,8 +91,10 @@ def _state(title: str, packing: Packing, rows: list[Row], direction: Any) -> str
         state = measure(packing, criterion=rule, direction=direction)
     except GranufabError as error:
         return _table(title, rows, str(error))
-    rows.append(("contacts", str(state["contact_count"]), rule))
-    names = ("z", "z_backbone", "rattler_fraction", "a", "a_signed", "q_over_p", "phi")
+    counted = state["contact_count"]
+    rows.append(("contacts", "–" if counted is None else str(int(counted)), rule))
+    signed = () if direction is None else ("a_signed",)
+    names = ("z", "z_backbone", "rattler_fraction", "a", *signed, "q_over_p", "phi")
     return _table(title, rows + _values(state, names), state["missing"])
 
 
@@ -154,7 +156,9 @@ def _table(
         for row in rows
     )  # fmt: skip
     below = "" if not note else f"<div><small>{escape(str(note))}</small></div>"
-    caption = f'<caption style="text-align: left"><b>{escape(title)}</b></caption>'
+    caption = (
+        f'<caption style="text-align: left; white-space: nowrap"><b>{escape(title)}</b></caption>'
+    )
     top = f"<thead><tr>{head}</tr></thead>" if head else ""
     return f"<div><table>{caption}{top}<tbody>{body}</tbody></table>{below}</div>"
 
@@ -169,11 +173,11 @@ def _picture(limits: AccessibleFit | AccessibleDomain) -> str:
     domain = limits.domain if isinstance(limits, AccessibleFit) else limits
     wide = 0.15 * (domain.z_max - domain.z_min)
     panel.set_xlim(domain.z_min - wide, domain.z_max + wide)
+    panel.set_ylim(0, 1.25 * domain.a_star)
     limit_lines(panel, limits, scaled=False)
     critical_marker(panel, limits, scaled=False)
     panel.set_xlabel("$z$ [-]")
     panel.set_ylabel("$a$ [-]")
-    panel.set_ylim(bottom=0)
     stream = io.BytesIO()
     figure.savefig(stream, format="svg", metadata={"Date": None})
     text = base64.b64encode(stream.getvalue()).decode()

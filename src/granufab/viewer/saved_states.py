@@ -35,6 +35,8 @@ def saved_states(run: Run, frame: Frame, rules: Sequence[Rule]) -> bytes:
     units: dict[str, Any] = {}
     for state in states.values():
         units |= state.pop("units", {})
+    for state in states.values():
+        state["values"] = state["values"] or dict.fromkeys(units)
     data = {"units": units, "states": states, "criterion": _sliders(states, rules)}
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.encode()

@@ -49,6 +49,8 @@ def page_parts(files: Mapping[str, PageFile], title: str) -> tuple[bytes, bytes]
     texts = {name: file.content.decode() for name, file in files.items()}
     nonce = hashlib.sha256("".join(texts.values()).encode()).hexdigest()[:32]
     page = texts["index.html"]
+    page = re.sub(r"<title>.*?</title>", lambda _: f"<title>{escape(title)}</title>", page)
+    page = page.replace('<meta charset="utf-8">', f'<meta charset="utf-8">\n{_policy(nonce)}', 1)
 
     def style(found: re.Match[str]) -> str:
         return f"<style>\n{_inert(_file(texts, found[1]), 'style')}</style>"
@@ -66,8 +68,6 @@ def page_parts(files: Mapping[str, PageFile], title: str) -> tuple[bytes, bytes]
 
     for pattern, change in ((_STYLE, style), (_MODULE, module), (_SCRIPT, script)):
         page = pattern.sub(change, page)
-    page = re.sub(r"<title>.*?</title>", lambda _: f"<title>{escape(title)}</title>", page)
-    page = page.replace('<meta charset="utf-8">', f'<meta charset="utf-8">\n{_policy(nonce)}', 1)
     head, end, rest = page.partition("<script")
     lacking = re.search(r'(?:src|href)="/page/([^"]*)"', head + rest)
     if lacking or not end:

@@ -15,7 +15,9 @@ export function restore() {
 
 export function remember() {
   const kept = Object.entries(view).filter(([, value]) => value !== "");
-  history.replaceState(null, "", `#${new URLSearchParams(kept)}`);
+  try {
+    history.replaceState(null, "", `#${new URLSearchParams(kept)}`);
+  } catch { /* inside a notebook the page has no address of its own */ }
 }
 
 export const isDark = () => (view.theme ? view.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches);
