@@ -32,10 +32,10 @@ SIZES, THEMES = ((1280, 720), (1920, 1080)), ("light", "dark")
 MOST_BYTES, MOST_TOGETHER = 150_000, 4_000_000
 QUICK = {"path.0.inertial_number": 1e-3, "path.0.strain": 0.24, "record.frame_interval": 0.012}
 CASES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
-    "loose": ("shear", {**QUICK, "sample.grain_count": 500, "sample.friction": 0.6}),
-    "dense": ("shear", {**QUICK, "sample.grain_count": 500, "sample.seed": 2}),
+    "loose": ("shear", {**QUICK, "sample.grain_count": 220, "sample.friction": 0.6}),
+    "dense": ("shear", {**QUICK, "sample.grain_count": 220, "sample.seed": 2}),
     "spheres": ("triaxial", {
-        "sample.grain_count": 800, "path.0.inertial_number": 2e-3, "path.0.strain": 0.3,
+        "sample.grain_count": 400, "path.0.inertial_number": 2e-3, "path.0.strain": 0.3,
         "record.frame_interval": 0.02,
     }),
 }  # fmt: skip
