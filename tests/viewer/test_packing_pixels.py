@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from granufab import read
 from granufab.viewer import ViewedRun, frame_buffer, unpack
 
-pytest.importorskip("browser", reason="the browser's fixtures")
-
 RENDERERS = ("webgl2", "canvas2d")
 CANVAS = "#packing canvas"
 FRAME = 7
