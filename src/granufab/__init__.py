@@ -7,9 +7,10 @@ costs nothing until something is asked for.
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as _version
 from typing import TYPE_CHECKING, Any
+
+from granufab.notebook_hook import register as _register
+from granufab.version import VERSION
 
 if TYPE_CHECKING:
     from granufab import fabric, plots, reproduce, states
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
         Biaxial,
         ConstantMean,
         Isotropic,
-        Loading,
         SimpleShear,
         Step,
         compress,
@@ -35,11 +35,9 @@ if TYPE_CHECKING:
     )
     from granufab.simulate.settings import Case, load_case
     from granufab.states import AccessibleDomain, fit_accessible_states, mohr
+    from granufab.viewer.notebook import view
 
-try:
-    __version__ = _version("granufab")
-except PackageNotFoundError:  # used from its source tree without installing
-    __version__ = "0+unknown"
+__version__ = VERSION
 
 _HOME = {
     "random_sample": "simulate",
@@ -49,7 +47,6 @@ _HOME = {
     "shear": "simulate",
     "run": "simulate",
     "run_case": "simulate",
-    "Loading": "simulate",
     "ConstantMean": "simulate",
     "Biaxial": "simulate",
     "SimpleShear": "simulate",
@@ -66,6 +63,7 @@ _HOME = {
     "mohr": "states",
     "AccessibleDomain": "states",
     "fit_accessible_states": "states",
+    "view": "viewer.notebook",
     "GranufabError": "errors",
 }
 _SUBPACKAGES = ("fabric", "states", "plots", "reproduce")
@@ -77,7 +75,6 @@ __all__ = [
     "ConstantMean",
     "GranufabError",
     "Isotropic",
-    "Loading",
     "Packing",
     "Run",
     "SimpleShear",
@@ -101,7 +98,11 @@ __all__ = [
     "run_case",
     "shear",
     "states",
+    "view",
 ]
+
+
+_register()
 
 
 def __getattr__(name: str) -> Any:

@@ -19,9 +19,9 @@ import granufab
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PROMISED = (
     *("random_sample", "compress", "prepare", "shear", "run", "Run", "Case", "load_case"),
-    *("Loading", "Biaxial", "SimpleShear", "ConstantMean", "Isotropic", "read", "measure"),
+    *("Biaxial", "SimpleShear", "ConstantMean", "Isotropic", "read", "measure"),
     *("fabric", "fabric_tensor", "orientation", "mohr", "AccessibleDomain"),
-    *("fit_accessible_states", "plots", "reproduce", "__version__"),
+    *("fit_accessible_states", "plots", "reproduce", "view", "__version__"),
 )
 
 

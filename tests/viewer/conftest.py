@@ -15,7 +15,9 @@ from granufab.viewer import ViewedRun
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from browser import chromium, look_at  # noqa: F401  fixtures
 from looking import Viewer, looking_at
+from page_data import disks, second_file, two_runs  # noqa: F401  fixtures
 from sheared_run import sheared_frames, write_run
 
 

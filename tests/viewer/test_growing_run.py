@@ -79,3 +79,12 @@ def test_the_server_follows(view_of: Look, tmp_path: Path) -> None:
             assert header["eps_q"] == pytest.approx(0.1)
             assert len(arrays["gained"]) == header["contact_count"]
             assert viewer.get("/api/runs/0/frames/0/packing").headers["etag"] == first
+
+
+def test_the_server_says_that_the_file_is_gone(view_of: Look, tmp_path: Path) -> None:
+    path = write_run(tmp_path / "run.h5", sheared_frames(2, 2))
+    with looking_at(view_of(path)) as viewer:
+        assert viewer.get("/api/runs/0").json()["problem"] is None
+        path.unlink()
+        for listed in (viewer.get("/api/runs").json()["runs"][0], viewer.get("/api/runs/0").json()):
+            assert "no such file" in listed["problem"]

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import granufab
 from granufab.campaign.case_work import Task
 from granufab.campaign.dask_pool import check_dask, run_dask
 from granufab.campaign.expansion import Member, expand
@@ -23,6 +22,7 @@ from granufab.errors import InvalidSettings, MissingData
 from granufab.io import RunLock, write_dataset, write_json
 from granufab.reproduce.case_folder import RunCase, check_writable
 from granufab.simulate.team import core_count
+from granufab.version import VERSION
 
 __all__ = ["plan_workers", "prepare_manifest", "run_campaign"]
 
@@ -255,7 +255,7 @@ def _conclude(
         except MissingData:  # cases that were taken away in the meantime
             results = None
     summary = {
-        "granufab": granufab.__version__,
+        "granufab": VERSION,
         "name": campaign.sweep.name,
         **how,
         "cases": len(ledger.rows),

@@ -1,4 +1,4 @@
-"""``granufab view``: a page in the browser, served from this machine."""
+"""``granufab view``: a page in the browser, served from this machine or saved with its data."""
 
 from __future__ import annotations
 
@@ -16,6 +16,9 @@ from granufab.cli.foreign import (
     open_runs,
     print_summaries,
 )
+from granufab.cli.output_files import check_new
+from granufab.cli.progress import show_progress
+from granufab.errors import InvalidSettings
 
 if TYPE_CHECKING:
     from granufab.viewer.viewed_run import ViewedRun
@@ -35,12 +38,26 @@ def view(
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
     ] = True,
+    export: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.html", help="Write the page with its data inside instead."),
+    ] = None,
+    most: Annotated[
+        str | None,
+        typer.Option(metavar="SIZE", help="Largest FILE, thinning frames; default 20MB."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace FILE if it exists.")] = False,
 ) -> None:
     """Look at runs in the browser; follows files that are still being written.
 
     Prints the address of the page, token included, and serves it until Ctrl-C or SIGTERM, which
-    is the usual end: exit code 0.
+    is the usual end: exit code 0. With --export it writes one file that opens from disk.
     """
+    if export is not None:
+        _export(files, foreign, export, most, force)
+        return
+    if most is not None or force:
+        raise InvalidSettings(f"--{'force' if most is None else 'most'} is for --export FILE")
     from granufab.viewer.server import serve
 
     opened = open_runs(files, foreign)
@@ -53,6 +70,28 @@ def view(
 
     with suppress(KeyboardInterrupt):
         serve([_viewed(one, foreign) for one in opened], port=port, started=started)
+
+
+def _export(
+    files: list[Path], foreign: ForeignOptions, export: Path, most: str | None, force: bool
+) -> None:
+    from granufab.io import ReadOptions
+    from granufab.viewer.export import MOST, save_page, saved_page
+
+    check_new(export, force)
+    if export.suffix.lower() not in (".html", ".htm"):
+        raise InvalidSettings(f"--export {export}: the name must end in .html")
+    opened = open_runs(files, foreign, own=("frames",))
+    print_summaries(opened)
+    chosen = ReadOptions(frames=foreign.frames).frame_slice()
+    parts = [slice(None) if one.foreign else chosen for one in opened]
+    with show_progress() as progress:
+        viewed = [_viewed(one, foreign) for one in opened]
+        page = saved_page(viewed, frames=parts, most=most or MOST, progress=progress)
+    save_page(page, export, force=force)
+    print(f"wrote {export}, {len(page.content) / 1e6:.1f} MB")
+    for line in page.lines:
+        print(f"  {line}")
 
 
 def _viewed(one: Opened, foreign: ForeignOptions) -> ViewedRun:

@@ -6,6 +6,7 @@ display is needed.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,12 +25,17 @@ __all__ = [
     "COLUMN",
     "FIT",
     "INK",
+    "ON_SCREEN",
     "POINTS",
+    "ColumnFigure",
     "letter_panels",
     "new_figure",
     "save",
     "style",
 ]
+
+ON_SCREEN = 150
+"""Dots per inch of a figure in a notebook."""
 
 COLUMN = 84 / 25.4
 """Width of a journal column [inch]."""
@@ -88,7 +94,7 @@ _RC: dict[Any, Any] = {
     "legend.handletextpad": 0.5,
     "legend.labelspacing": 0.25,
     "legend.borderaxespad": 0.4,
-    "figure.dpi": 150,
+    "figure.dpi": ON_SCREEN,
     "savefig.dpi": 300,
     "savefig.bbox": None,
     "pdf.fonttype": 42,
@@ -97,7 +103,7 @@ _RC: dict[Any, Any] = {
 }
 
 
-class _ColumnFigure(Figure):
+class ColumnFigure(Figure):
     """A figure that keeps the house style whenever it is drawn or saved."""
 
     def draw(self, renderer: Any) -> None:
@@ -107,6 +113,15 @@ class _ColumnFigure(Figure):
     def savefig(self, *args: Any, **kwargs: Any) -> None:
         with style():
             super().savefig(*args, **kwargs)
+
+    def png(self) -> bytes:
+        """The figure as a picture for the screen."""
+        stream = io.BytesIO()
+        self.savefig(stream, format="png", dpi=ON_SCREEN)
+        return stream.getvalue()
+
+    def _repr_png_(self) -> bytes:  # a notebook shows it
+        return self.png()
 
 
 @contextmanager
@@ -139,7 +154,7 @@ def new_figure(
     """
     with style():
         size = (width, height if height is not None else 0.78 * width * rows)
-        figure = _ColumnFigure(figsize=size, layout="constrained")
+        figure = ColumnFigure(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)
         grid = figure.add_gridspec(rows, 1, height_ratios=ratios)
         axes: list[Axes] = []

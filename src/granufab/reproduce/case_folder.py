@@ -279,10 +279,10 @@ def _simulator() -> RunCase:
 
 
 def _summary(case: Case, run: Run) -> dict[str, Any]:
-    import granufab
+    from granufab.version import VERSION
 
     return {
-        "granufab": granufab.__version__,
+        "granufab": VERSION,
         "name": case.name,
         "z_definition": case.record.z_definition,
         **run.summary,

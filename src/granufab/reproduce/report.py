@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-import granufab
 from granufab.errors import GranufabError
 from granufab.history import Run
 from granufab.reproduce.recipe import Outcome, PathRecipe, Recipe, column, first_stage, reached_z
@@ -17,6 +16,7 @@ from granufab.reproduce.workers import Job
 from granufab.simulate.settings import Case
 from granufab.states import AccessibleFit, CriticalState, Estimate, critical_state
 from granufab.states import fit_accessible_states as fit_states
+from granufab.version import VERSION
 
 __all__ = ["METHODS", "estimate", "fit_all", "fit_entry", "fit_runs", "report"]
 
@@ -99,7 +99,7 @@ def report(outcome: Outcome, jobs: Mapping[str, Sequence[Job]], folder: Path) ->
         folders = [job.folder.relative_to(folder).as_posix() for job in jobs[path.name]]
         paths.append(_path_entry(outcome, path) | {"runs": folders})
     return {
-        "granufab": granufab.__version__,
+        "granufab": VERSION,
         "settings": _settings(cases),
         "seed": None,
         "criterion": record.criterion,

@@ -118,7 +118,7 @@ class Answers:
     ) -> bytes:
         viewed = self._run(run)
         with self._busy[run]:
-            key = (name, run, viewed.refresh(), rest)
+            key = (name, run, viewed.refresh(), viewed.problem, rest)
             return self._cache.get(key, lambda: _json(make(viewed)))
 
     def _of_frame(

@@ -3,7 +3,8 @@
 Layout: 4 bytes ``GFV1``, the length of the header as uint32, the header as UTF-8 JSON filled up
 with spaces to a multiple of 8 bytes, then the arrays, each at a multiple of 8 bytes. The header
 names them: ``arrays: {name: {type, shape, offset}}``, where ``offset`` counts from the end of the
-header and ``type`` is float32, float64, uint32 or int32.
+header and ``type`` is float32, float64, uint32 or int32, in saved pages also uint16, int16, uint8
+or int8.
 """
 
 from __future__ import annotations
@@ -24,7 +25,10 @@ __all__ = ["MAGIC", "pack", "unpack"]
 MAGIC = b"GFV1"
 """First bytes of every block."""
 _PLACE = 8
-_TYPES = {"float32": "<f4", "float64": "<f8", "uint32": "<u4", "int32": "<i4"}
+_TYPES = {
+    "float32": "<f4", "float64": "<f8", "uint32": "<u4", "int32": "<i4",
+    "uint16": "<u2", "int16": "<i2", "uint8": "<u1", "int8": "<i1",
+}  # fmt: skip
 
 
 def pack(header: Mapping[str, Any], arrays: Mapping[str, NDArray]) -> bytes:
@@ -32,7 +36,7 @@ def pack(header: Mapping[str, Any], arrays: Mapping[str, NDArray]) -> bytes:
 
     Args:
         header: plain data; NaN and ±∞ become null.
-        arrays: of the types float32, float64, uint32 and int32.
+        arrays: of the types named above.
     """
     listed, parts, offset = {}, [], 0
     for name, array in arrays.items():

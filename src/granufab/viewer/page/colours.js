@@ -19,3 +19,18 @@ export function theme() {
   const names = ["back", "ink", "soft", "line", "panel", "grain", "rim", "force", "weak", "gain", "loss", "mark"];
   return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
+
+// Red, green, blue from 0 to 1 of "#rgb", "#rrggbb" or "rgb(r,g,b)".
+export function rgb(text) {
+  if (text.startsWith("#")) {
+    const wide = text.length < 7 ? text.replace(/[^#]/g, "$&$&") : text;
+    return [1, 3, 5].map((k) => parseInt(wide.slice(k, k + 2), 16) / 255);
+  }
+  return text.match(/[\d.]+/g).slice(0, 3).map((part) => Number(part) / 255);
+}
+
+// Between two colours, as text again.
+export function blend(one, other, share) {
+  const [from, to] = [rgb(one), rgb(other)];
+  return `rgb(${from.map((value, k) => Math.round(255 * (value + share * (to[k] - value)))).join(",")})`;
+}

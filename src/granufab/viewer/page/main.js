@@ -1,219 +1,225 @@
 // The page: one choice of run, frame and criterion, which every panel follows.
 
-import { moved } from "./domain.js";
+import { arrange, fillBars } from "./bars.js";
+import { choice, criterionText, drawCurve, meaning, slides } from "./criterion.js";
+import { chosen } from "./domain.js";
+import { $, bind, fillRuns, offer, savedWords } from "./fields.js";
+import { follow } from "./following.js";
+import { latest } from "./latest.js";
+import { frameWords, showNumbers } from "./numbers.js";
 import { PackingView } from "./packing.js";
-import { drawMohr, drawPath, drawRose, drawSeries } from "./panels.js";
-import { Failure, Source } from "./source.js";
+import { Panels } from "./panels.js";
+import { Player } from "./playing.js";
+import { fileName, save } from "./saving.js";
+import { Failure, openSource } from "./source.js";
+import { isDark, remember, restore, view } from "./view.js";
 
-const $ = (id) => document.getElementById(id);
-const source = new Source();
-const view = { run: 0, frame: -1, definition: "z_backbone", kind: "", level: 16, colour: "contact_number", lines: "force", plane: "a", theme: "", low: "", high: "" };
-const known = { listed: [], overview: null, series: [], fit: null, state: null, curves: null, ticket: 0 };
-const packing = new PackingView($("canvas"), (words) => { $("picked").textContent = words; });
-const told = (text) => { $("message").textContent = text || ""; };
-
-function restore() {
-  for (const [name, text] of new URLSearchParams(location.hash.slice(1))) {
-    if (name in view) view[name] = typeof view[name] === "number" ? Number(text) || 0 : text;
-  }
-}
-
-function remember() {
-  const kept = Object.entries(view).filter(([, value]) => value !== "");
-  history.replaceState(null, "", `#${new URLSearchParams(kept)}`);
-}
-
-function choice() {
-  const curve = known.curves && known.curves[view.kind];
-  let criterion = view.kind === "listed" ? "listed" : "";
-  if (curve) criterion = `${view.kind}:${curve.threshold[Math.min(view.level, curve.threshold.length - 1)]}`;
-  return { criterion, z_definition: view.definition };
-}
-
-const domain = () => {
-  const fitted = known.fit && known.fit.domain;
-  if (!fitted || !view.low || !view.high || Number(view.low) >= Number(view.high)) return fitted;
-  return moved(fitted, Number(view.low), Number(view.high));
+const source = openSource();
+const known = {
+  listed: [], overview: null, series: [], fitted: null, domain: null, state: null, interval: null, curves: null, held: null,
+  version: 0, count: 0, eps: null, view,
 };
+const data = document.documentElement.dataset;
+const said = { lost: "", frame: "" };
 
-async function openRun() {
-  const fresh = await Promise.all([source.overview(view.run), ...known.listed.map(({ run }) => source.series(run)), source.fit(view.definition)]);
-  known.overview = fresh[0];
-  known.series = fresh.slice(1, -1).map((one, k) => ({ ...one, name: known.listed[k].name }));
-  known.fit = fresh[fresh.length - 1];
-  const last = known.overview.frame_count - 1;
-  if (view.frame < 0 || view.frame > last) view.frame = last;
-  $("frame").max = Math.max(last, 0);
-  handles();
-  await showFrame();
-}
-
-async function showFrame() {
-  const ticket = ++known.ticket;
-  const frames = known.overview.frames;
-  $("frame").value = view.frame;
-  if (view.frame < 0) { told("no frame is recorded yet"); return; }
-  try {
-    if (view.kind === "force" || view.kind === "gap") known.curves = await source.criterion(view.run, view.frame, choice());
-    else known.curves = null;
-    const chosen = choice();
-    const [data, state] = await Promise.all([source.packing(view.run, view.frame, chosen), source.state(view.run, view.frame, chosen)]);
-    if (ticket !== known.ticket) return; // another frame was asked for meanwhile
-    known.state = state;
-    packing.show(data);
-    $("legend").textContent = packing.prepared ? packing.prepared.shade.legend : "";
-    const eps = frames.eps_q[view.frame];
-    $("place").textContent = `frame ${frames.number[view.frame]} of ${frames.number.length}${eps === null ? "" : ` · ε_q = ${eps.toFixed(4)}`}`;
-    numbers(state);
-    charts();
-    const lacking = view.kind in (known.curves || { "": 1, listed: 1 }) ? "" : `no ${view.kind} in these data`;
-    told(lacking || state.missing || data.header.missing || known.overview.problem || "");
-    document.documentElement.dataset.drawn = packing.drawn.toFixed(1); // ms, for whoever measures
-    document.documentElement.dataset.shown = `${view.run}/${view.frame}/${state.criterion}`;
-  } catch (error) {
-    if (!(error instanceof Failure)) throw error;
-    told(error.message);
-  }
-  remember();
-  ahead(ticket);
-}
-
-// Fetch what a step in the same direction will show, once this frame stands.
-function ahead(ticket) {
-  const next = view.frame + (view.frame >= (known.shown ?? 0) ? 1 : -1);
-  known.shown = view.frame;
-  if (next < 0 || next >= known.overview.frame_count || view.kind === "force" || view.kind === "gap") return;
-  setTimeout(() => {
-    if (ticket !== known.ticket) return;
-    for (const fetched of [source.packing(view.run, next, choice()), source.state(view.run, next, choice())]) fetched.catch(() => {});
-  }, 0);
-}
-
-function numbers(state) {
-  const { values } = state;
-  const named = [["z", state.z_definition], ["a'", values.a_signed === null ? "a" : "a_signed"], ["rattlers", "rattler_fraction"], ["q/p", "q_over_p"], ["φ", "phi"], ["contacts", "contact_count"]];
-  $("numbers").replaceChildren(...named.map(([text, name]) => {
-    const span = document.createElement("span");
-    const value = values[name];
-    span.dataset.name = name;
-    span.dataset.value = value;
-    span.textContent = `${text} = ${value === null ? "?" : Number.isInteger(value) && name.endsWith("count") ? value : value.toFixed(4)}   `;
-    return span;
-  }));
-  $("criterion").textContent = state.criterion.replace(/:(.*)/, (_, number) => ` ${Number(number).toPrecision(3)}`);
-}
-
-function charts() {
-  const own = known.series[view.run];
-  drawRose($("rose"), known.state);
-  drawMohr($("mohr"), known.state, domain());
-  drawPath($("path-chart"), known.series, [known.state.point], domain(), view);
-  drawSeries($("series"), own, known.overview.frames.eps_q[view.frame], view.definition);
-  const found = domain();
-  $("limits").textContent = found ? `${found.z_min.toFixed(3)} … ${found.z_max.toFixed(3)}` : "no domain";
-  $("limits").title = known.fit && known.fit.missing ? known.fit.missing : "z_min … z_max";
-}
-
-function handles() {
-  const fitted = known.fit && known.fit.domain;
-  for (const [id, name] of [["low", "z_min"], ["high", "z_max"]]) {
-    $(id).disabled = !fitted;
-    if (!fitted) continue;
-    const wide = fitted.z_max - fitted.z_min;
-    $(id).min = Math.max(fitted[name] - wide, 0.05);
-    $(id).max = fitted[name] + wide;
-    $(id).value = view[id] || fitted[name];
-  }
-}
-
-// Ask again and again whether the files have grown; stay at the end if that is where one looks.
-async function follow() {
-  try {
-    const listed = (await source.runs()).runs;
-    const changed = listed.some((one, k) => !known.listed[k] || one.revision !== known.listed[k].revision);
-    if (listed.some((one, k) => known.listed[k] && one.generation !== known.listed[k].generation)) source.forget();
-    const first = !known.overview;
-    const atEnd = !first && view.frame === known.overview.frame_count - 1;
-    known.listed = listed;
-    if (changed) {
-      if (atEnd) view.frame = -1;
-      fillRuns();
-      await openRun();
-    }
-  } catch (error) {
-    told(error instanceof Failure ? error.message : "the server does not answer; is granufab view still running?");
-  }
-  setTimeout(follow, 1500);
-}
-
-function fillRuns() {
-  $("run").replaceChildren(...known.listed.map(({ run, name }) => new Option(name.split("/").slice(-3).join("/"), run)));
-  view.run = Math.min(view.run, known.listed.length - 1);
-  $("run").value = view.run;
-}
-
-function step(by) {
-  const count = known.overview ? known.overview.frame_count : 0;
-  if (!count) return;
-  view.frame = Math.min(Math.max(view.frame + by, 0), count - 1);
-  showFrame();
-}
-
-let playing = false;
-async function play() {
-  playing = !playing;
-  $("play").textContent = playing ? "❚❚" : "▶";
-  while (playing && known.overview) {
-    view.frame = (view.frame + 1) % known.overview.frame_count;
-    const pause = new Promise((done) => setTimeout(done, 120));
-    await showFrame();
-    await pause;
-  }
-}
-
-function dress() {
-  const dark = view.theme ? view.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-  document.documentElement.classList.toggle("dark", dark);
-  packing.prepared = null;
-  packing.draw();
-  if (known.state) charts();
-}
-
-function changing(id, name, then, event = "change") {
-  const field = $(id);
-  if (field.tagName === "SELECT") field.value = view[name];
-  field.addEventListener(event, () => { view[name] = typeof view[name] === "number" ? Number(field.value) : field.value; then(); });
+function told(kind, text) {
+  said[kind] = text || "";
+  $("message").textContent = $("message").title = said.lost || said.frame;
 }
 
 restore();
-changing("run", "run", () => { view.frame = -1; openRun(); });
-changing("definition", "definition", () => openRun());
-changing("kind", "kind", () => showFrame());
-changing("threshold", "level", () => showFrame(), "input");
-changing("colour", "colour", () => { packing.set({ colour: view.colour }); $("legend").textContent = packing.prepared.shade.legend; remember(); });
-changing("lines", "lines", () => { packing.set({ lines: view.lines }); remember(); });
-changing("plane", "plane", () => { charts(); remember(); });
-changing("low", "low", () => { charts(); remember(); }, "input");
-changing("high", "high", () => { charts(); remember(); }, "input");
-changing("frame", "frame", () => showFrame(), "input");
-$("threshold").value = view.level;
-packing.set({ colour: view.colour, lines: view.lines });
-$("fitted").addEventListener("click", () => { view.low = view.high = ""; handles(); charts(); remember(); });
+document.documentElement.classList.toggle("dark", isDark());
+const packing = new PackingView($("canvas"), (words) => { $("picked").textContent = words; });
+const panels = new Panels(known, view, { limits: moveLimit, settled: settleLimits, jump: (frame) => goTo(frame) });
+
+async function openRun() {
+  const [overview, fit, ...series] = await Promise.all([source.overview(view.run), source.fit(view.definition), ...known.listed.map(({ run }) => source.series(run))]);
+  known.version += 1;
+  known.overview = overview;
+  known.series = series.map((one, k) => ({ ...one, name: known.listed[k].name }));
+  known.seriesMissing = series[view.run].missing;
+  known.fitted = fit.domain;
+  known.fitMissing = fit.missing;
+  known.domain = chosen(known.fitted, view);
+  const last = overview.frame_count - 1;
+  if (view.frame < 0 || view.frame > last) view.frame = last;
+  $("frame").max = Math.max(last, 0);
+  const words = [savedWords(source.saved), ...(overview.source || [])].filter(Boolean);
+  $("saved").textContent = $("saved").title = words.join(" · ");
+  offer(source.choices);
+  await showFrame();
+}
+
+// The frame that the view asks for; of several asked for while one is drawn, the last.
+const showFrame = latest(async () => {
+  if (!known.overview) return;
+  $("frame").value = view.frame;
+  remember();
+  if (view.frame < 0) { told("frame", "no frame is recorded yet"); return; }
+  const started = performance.now();
+  try {
+    await drawFrame(view.run, view.frame);
+    data.change = (performance.now() - started).toFixed(1);
+  } catch (error) {
+    if (!(error instanceof Failure)) throw error;
+    told("frame", error.message);
+  }
+  ahead();
+});
+
+async function drawFrame(run, frame) {
+  const curves = slides(view) ? await source.criterion(run, frame, choice(view, null)) : null;
+  fitLevel(curves);
+  const asked = choice(view, curves);
+  const interval = view.tab === "changes" ? intervalOf(run, frame, asked) : null;
+  const [packed, state] = await Promise.all([source.packing(run, frame, asked), source.state(run, frame, asked)]);
+  Object.assign(known, { count: known.count + 1, state, curves, eps: known.overview.frames.eps_q[frame], interval: await interval });
+  packing.show(packed);
+  $("legend").textContent = packing.legend;
+  $("place").textContent = frameWords(known.overview, frame);
+  showNumbers($("numbers"), state);
+  showCriterion(state);
+  await panels.draw();
+  const lacking = slides(view) && !(curves && curves[view.kind]) ? `no ${view.kind} in these data, so the criterion stays ${criterionText(state.criterion)}` : "";
+  const { problem } = known.listed[run];
+  told("frame", problem || lacking || state.missing || packed.header.missing);
+  data.drawn = packing.drawn.toFixed(1); // ms, for whoever measures
+  data.shown = `${run}/${frame}/${state.criterion}`;
+}
+
+// Saved files hold fewer levels: one beyond them becomes the middle one.
+function fitLevel(curves) {
+  const curve = curves && curves[view.kind];
+  if (!curve) return;
+  if (view.level >= curve.threshold.length) view.level = Math.floor(curve.threshold.length / 2);
+  $("threshold").max = curve.threshold.length - 1;
+  $("threshold").value = view.level;
+}
+
+async function intervalOf(run, frame, asked) {
+  try {
+    return await source.interval(run, frame, asked);
+  } catch (error) {
+    if (!(error instanceof Failure)) throw error;
+    return { missing: error.message };
+  }
+}
+
+function showCriterion(state) {
+  const curve = slides(view) && known.curves ? known.curves[view.kind] : null;
+  $("threshold").hidden = !curve;
+  $("threshold").setAttribute("aria-valuetext", criterionText(state.criterion));
+  $("criterion").textContent = criterionText(state.criterion);
+  $("criterion").title = meaning(view.kind);
+  drawCurve($("curve"), curve, view.level);
+}
+
+// Fetch what a step in the same direction will show, once this frame stands.
+function ahead() {
+  const next = view.frame + (view.frame >= (known.before ?? 0) ? 1 : -1);
+  known.before = view.frame;
+  if (next < 0 || next >= known.overview.frame_count || slides(view)) return;
+  const run = view.run;
+  setTimeout(() => {
+    if (run !== view.run || known.before !== view.frame) return;
+    const asked = choice(view, null);
+    const fetched = [source.packing(run, next, asked), source.state(run, next, asked)];
+    if (view.tab === "changes") fetched.push(source.interval(run, next, asked));
+    for (const one of fetched) one.catch(() => {});
+  }, 0);
+}
+
+// ---- what the user asks for
+
+function goTo(frame) {
+  const count = known.overview ? known.overview.frame_count : 0;
+  if (!count) return null;
+  view.frame = Math.min(Math.max(frame, 0), count - 1);
+  return showFrame();
+}
+
+const redraw = latest(async () => { if (known.state) await panels.draw(); });
+
+function moveLimit(name, value) {
+  view[name === "z_min" ? "low" : "high"] = value.toFixed(4);
+  known.held ??= panels.ranges();
+  known.domain = chosen(known.fitted, view);
+  redraw();
+}
+
+function settleLimits() {
+  known.held = null;
+  redraw();
+  remember();
+}
+
+function arranged() {
+  arrange(view);
+  remember();
+  return view.tab === "changes" ? showFrame() : redraw();
+}
+
+function enlarge(name) {
+  const cell = name === "changes" ? "rose" : name;
+  view.large = view.large === cell ? "packing" : cell;
+  arranged();
+}
+
+async function savePanel(name, type) {
+  const blob = await (name === "packing" ? packing.picture(type === "svg" ? "image/svg+xml" : "image/png") : panels.picture(name, type));
+  const panel = name === "rose" && $("rose").classList.contains("surface") ? "surface" : name;
+  save(blob, fileName(known.listed[view.run].name, panel, known.overview.frames.number[view.frame], type));
+}
+
+function dress() {
+  document.documentElement.classList.toggle("dark", isDark());
+  panels.stale();
+  packing.set({ colour: view.colour, lines: view.lines, images: view.images });
+  $("legend").textContent = packing.legend;
+  redraw();
+}
+
+function dressPacking() {
+  packing.set({ colour: view.colour, lines: view.lines, images: view.images });
+  $("legend").textContent = packing.legend;
+  remember();
+}
+
+fillBars({ save: savePanel, large: enlarge, tab: (name) => { view.tab = name; arranged(); } });
+arrange(view);
+bind("run", "run", () => { view.frame = -1; openRun(); });
+bind("definition", "definition", openRun);
+bind("kind", "kind", () => { offer(source.choices); openRun(); });
+bind("threshold", "level", showFrame, "input");
+for (const name of ["colour", "lines", "images"]) bind(name, name, dressPacking);
+bind("plane", "plane", () => { redraw(); remember(); });
+bind("frame", "frame", showFrame, "input");
+dressPacking();
+$("fitted").addEventListener("click", () => { view.low = view.high = ""; known.domain = known.fitted; settleLimits(); });
 $("whole").addEventListener("click", () => packing.whole());
-$("play").addEventListener("click", play);
-$("theme").addEventListener("click", () => { view.theme = document.documentElement.classList.contains("dark") ? "light" : "dark"; dress(); remember(); });
-$("save").addEventListener("click", () => {
-  const link = document.createElement("a");
-  link.download = `packing-${view.frame}.png`;
-  link.href = $("canvas").toDataURL("image/png");
-  link.click();
+$("theme").addEventListener("click", () => { view.theme = isDark() ? "light" : "dark"; dress(); remember(); });
+$("help-key").addEventListener("click", () => $("help").showModal());
+const player = new Player($("play"), {
+  step: (by) => goTo(view.frame + by),
+  next: () => goTo((view.frame + 1) % Math.max(known.overview ? known.overview.frame_count : 1, 1)),
 });
 addEventListener("keydown", (event) => {
-  if (["SELECT", "INPUT"].includes(event.target.tagName) && event.target.id !== "frame") return;
-  const steps = { ArrowRight: 1, ArrowLeft: -1, PageDown: 10, PageUp: -10, Home: -1e9, End: 1e9 };
-  if (event.key in steps) { event.preventDefault(); step(steps[event.key]); }
-  if (event.key === " " && event.target.tagName !== "BUTTON") { event.preventDefault(); play(); }
+  if (player.pressed(event) || $("help").open) return;
+  if (event.key === "?" && event.target.tagName !== "INPUT") $("help").showModal();
+  if (event.key === "Escape" && view.large !== "packing") enlarge(view.large);
+});
+// After a click with the pointer the keys belong to the page again.
+addEventListener("click", (event) => {
+  const button = event.detail ? event.target.closest("button") : null;
+  if (button) button.blur();
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", dress);
-dress();
-follow();
+matchMedia("(min-width: 1600px)").addEventListener("change", dress);
+follow(source, async (listed, replaced) => {
+  if (replaced) source.forget();
+  const atEnd = known.overview && view.frame === known.overview.frame_count - 1;
+  if (atEnd) view.frame = -1; // stay at the end
+  known.listed = listed;
+  fillRuns(listed);
+  await openRun();
+}, (words) => told("lost", words));

@@ -1,140 +1,209 @@
-// The charts, drawn by plotly: rose, Mohr circle, path with the domain, series.
+// The panels: which are seen and where, when they are drawn, their words, and pictures of them.
 
-import { CYCLE, theme } from "./colours.js";
+import { changesFigure, changesWords } from "./changes.js";
+import { clicked, picture, plane, put } from "./charts.js";
+import { where } from "./domain.js";
+import { mohrFigure } from "./mohr.js";
+import { cursor, Handles, rings } from "./overlay.js";
+import { markTraces, marks, nearest, pathFigure } from "./path.js";
+import { roseFigure, unit } from "./rose.js";
+import { cursorShape, seriesFigure, strained } from "./series.js";
+import { SurfaceView } from "./surface.js";
 
-const { Plotly } = window;
-const CONFIG = {
-  displaylogo: false, responsive: true,
-  modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"],
-  toImageButtonOptions: { format: "svg" },
-};
+const $ = (id) => document.getElementById(id);
+const HEADS = { rose: "Rose E(θ)", mohr: "Mohr circle of the fabric G", path: "Path and domain", series: "Series", changes: "Contacts gained, lost" };
+const NAMES = Object.keys(HEADS);
 
-function layout(more) {
-  const colours = theme();
-  const axis = { gridcolor: colours.line, zerolinecolor: colours.line, linecolor: colours.soft, ticks: "inside", automargin: true };
-  const base = {
-    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: colours.ink, size: 12 },
-    margin: { l: 48, r: 14, t: 26, b: 36 }, showlegend: false, hovermode: "closest", uirevision: "kept",
-  };
-  const found = { ...base, ...more };
-  for (const name of Object.keys(found)) if (/^[xy]axis/.test(name)) found[name] = { ...axis, ...found[name] };
-  return found;
-}
-
-const title = (text) => ({ text, font: { size: 13 }, x: 0.02, xanchor: "left", y: 0.98, yanchor: "top" });
-const watched = new WeakSet();
-
-// Draws a chart, and fits it again whenever its place changes size.
-function put(where, traces, more) {
-  const drawn = Plotly.react(where, traces, layout(more), CONFIG);
-  if (!watched.has(where)) {
-    watched.add(where);
-    new ResizeObserver(() => { if (where.clientHeight) Plotly.Plots.resize(where); }).observe(where);
+export class Panels {
+  // `known` is everything that is shown, `act` what a panel asks for: {tab, limits, jump, settled}.
+  constructor(known, view, act) {
+    Object.assign(this, { known, view, act, drawn: {}, figures: {} });
+    this.surface = new SurfaceView($("surface-canvas"));
+    this.handles = new Handles($("path-chart"), {
+      limits: () => this.limits(), moved: (name, value) => act.limits(name, value), done: () => act.settled(),
+    });
+    clicked($("series-chart"), (x) => this.jumpSeries(x));
+    clicked($("path-chart"), (x, y) => this.jumpPath(x, y));
   }
-  return drawn;
-}
 
-// Points that some angles repeat over the whole turn, [degree] and values in order.
-function around(rose, theta, values) {
-  const turns = rose.axis ? [(t) => t, (t) => Math.PI - t, (t) => Math.PI + t, (t) => 2 * Math.PI - t] : [(t) => t, (t) => t + Math.PI];
-  const points = turns.flatMap((turn) => theta.map((t, k) => [(180 / Math.PI) * turn(t), values[k]]));
-  points.sort((one, two) => one[0] - two[0]);
-  return [[...points.map(([t]) => t), points[0][0] + 360], [...points.map(([, v]) => v), points[0][1]]];
-}
-
-export function drawRose(where, state) {
-  const colours = theme();
-  const rose = state.rose;
-  if (!rose) return put(where, [], { title: title("E(θ): no contacts") });
-  const [dots, values] = around(rose, rose.theta, rose.E);
-  const [, errors] = around(rose, rose.theta, rose.E_error);
-  const curve = (name) => around(rose, rose.curve.theta, rose.curve[name]);
-  const [angle, fit] = curve("E");
-  const [, low] = curve("low");
-  const [, high] = curve("high");
-  const bars = dots.flatMap((t) => [t, t, null]);
-  const ends = values.flatMap((v, k) => [Math.max(v - errors[k], 0), v + errors[k], null]);
-  const line = (r, more) => ({ type: "scatterpolar", mode: "lines", theta: angle, r, hoverinfo: "skip", ...more });
-  const colour = CYCLE[0];
-  const traces = [
-    line(low, { line: { width: 0 } }),
-    line(high, { line: { width: 0 }, fill: "tonext", fillcolor: "rgba(0,114,178,0.28)" }),
-    line(fit, { line: { color: colour, width: 2 } }),
-    { type: "scatterpolar", mode: "lines", theta: bars, r: ends, line: { color: colours.soft, width: 1 }, hoverinfo: "skip" },
-    { type: "scatterpolar", mode: "markers", theta: dots, r: values, marker: { size: 4, color: colours.back, line: { color: colour, width: 1.2 } }, hovertemplate: "θ = %{theta:.0f}°<br>E = %{r:.3f}<extra></extra>" },
-  ];
-  const unit = rose.unit.replace("1/", "") + "<sup>−1</sup>";
-  return put(where, traces, {
-    title: title(`E(θ) [${unit}] · a = ${rose.a.toFixed(3)} ± ${rose.a_error.toFixed(3)}`),
-    margin: { l: 30, r: 30, t: 50, b: 24 },
-    polar: {
-      bgcolor: "rgba(0,0,0,0)",
-      radialaxis: { gridcolor: colours.line, angle: 22, tickangle: 0, rangemode: "tozero", nticks: 4, tickfont: { size: 10 } },
-      angularaxis: { gridcolor: colours.line, rotation: rose.axis ? 90 : 0, direction: rose.axis ? "clockwise" : "counterclockwise" },
-    },
-  });
-}
-
-export function drawMohr(where, state, domain) {
-  const colours = theme();
-  const traces = [];
-  const circle = ([centre, radius], more) => {
-    const turn = Array.from({ length: 121 }, (_, k) => (2 * Math.PI * k) / 120);
-    traces.push({ mode: "lines", x: turn.map((t) => centre + radius * Math.cos(t)), y: turn.map((t) => radius * Math.sin(t)), ...more });
-  };
-  if (domain) {
-    const { limits, critical } = domain.mohr;
-    circle(critical, { line: { color: colours.soft, width: 1, dash: "dash" }, name: "critical", hoverinfo: "name" });
-    traces.push({ mode: "markers+text", x: limits, y: [0, 0], text: ["L₁", "L₂"], textposition: "bottom center", marker: { color: colours.ink, size: 7 }, hovertemplate: "G = %{x:.4f}<extra></extra>" });
+  seen(name) {
+    if (name === "rose") return this.view.tab !== "changes";
+    return name !== "changes" || this.view.tab === "changes";
   }
-  (state.mohr ? state.mohr.circles : []).forEach((one, k) =>
-    circle(one, { line: { color: CYCLE[0], width: k ? 1 : 2.5 }, hovertemplate: `centre ${one[0].toFixed(4)}, radius ${one[1].toFixed(4)}<extra></extra>` }));
-  return put(where, traces, {
-    title: title("Mohr circle of G"), xaxis: { title: { text: "G<sub>n</sub> [-]" } },
-    yaxis: { title: { text: "G<sub>t</sub> [-]" }, scaleanchor: "x" },
-  });
-}
 
-export function drawPath(where, runs, points, domain, view) {
-  const colours = theme();
-  const scaled = view.plane === "az";
-  const traces = [];
-  const values = [...runs.flatMap((run) => run.columns.a_signed || []), ...points.map((point) => point && point.a)];
-  const sideways = values.some((a) => a !== null && a < -0.02);
-  for (const side of domain ? domain.sides : []) {
-    if (side.sign < 0 && !sideways) continue;
-    const factor = (values) => values.map((a, k) => (a === null ? null : scaled ? a * side.z[k] : a));
-    traces.push({ mode: "lines", x: side.z, y: factor(side.a_max), fill: "tozeroy", fillcolor: "rgba(128,128,128,0.16)", line: { color: colours.soft, width: 1.2, dash: "dash" }, hoverinfo: "skip" });
-    traces.push({ mode: "markers", x: [side.z_star], y: [scaled ? side.a_star * side.z_star : side.a_star], marker: { symbol: "star", size: 11, color: "#f7d84a", line: { color: colours.ink, width: 1 } }, name: "critical", hovertemplate: "z* = %{x:.3f}, %{y:.3f}<extra></extra>" });
+  // Draws what is seen and has changed.
+  async draw() {
+    const { rose } = this.known.state;
+    for (const tab of document.querySelectorAll("[role=tab][data-tab=surface]")) tab.hidden = !(rose && rose.surface);
+    const work = NAMES.filter((name) => this.seen(name)).map((name) => this[name]());
+    await Promise.all(work);
   }
-  runs.forEach((run, k) => {
-    const z = run.columns[view.definition];
-    const a = run.columns.a_signed;
-    if (!z || !a) return;
-    traces.push({ mode: "lines", x: z, y: scaled ? a.map((value, i) => (value === null ? null : value * z[i])) : a, line: { color: CYCLE[k % CYCLE.length], width: 1.4 }, name: run.name, hovertemplate: "z = %{x:.3f}, %{y:.3f}<extra>%{fullData.name}</extra>" });
-  });
-  const here = points.filter((point) => point && point.z !== null);
-  traces.push({ mode: "markers", x: here.map((p) => p.z), y: here.map((p) => (scaled ? p.az : p.a)), marker: { size: 12, symbol: "circle-open", color: colours.mark, line: { width: 3 } }, name: "this state", hovertemplate: "z = %{x:.4f}, %{y:.4f}<extra>this state</extra>" });
-  return put(where, traces, {
-    title: title(scaled ? "Path and accessible domain in (z, a'z)" : "Path and accessible domain in (z, a')"),
-    xaxis: { title: { text: "z [-]" } }, yaxis: { title: { text: scaled ? "a' z [-]" : "a' [-]" } },
-  });
+
+  // Draws a figure unless `key` says that it stands already; a reason where there is none.
+  async chart(name, figure, key, reason, after = () => {}) {
+    const place = $(`${name}-chart`);
+    if (this.drawn[name] === key) { after(); return; }
+    this.drawn[name] = key;
+    const made = figure(this.known);
+    this.figures[name] = made;
+    const section = $(name);
+    section.classList.toggle("empty", !made);
+    section.querySelector(".reason").textContent = made ? "" : reason;
+    for (const button of section.querySelectorAll("button.save")) button.disabled = !made;
+    if (!made) { titled(section, HEADS[name]); return; }
+    titled(section, made.head || made.title);
+    keyed(section.querySelector(".keyrow"), made.keys);
+    await put(place, made, after);
+  }
+
+  async rose() {
+    const { state } = this.known;
+    const solid = Boolean(state.rose && state.rose.surface);
+    $("rose").classList.toggle("surface", this.view.tab === "surface" && solid);
+    if (this.view.tab !== "surface" || !solid) {
+      await this.chart("rose", roseFigure, String(this.known.count), lacking(state));
+      return;
+    }
+    $("rose").classList.remove("empty");
+    titled($("rose"), this.surfaceTitle());
+    for (const button of $("rose").querySelectorAll("button.save")) button.disabled = false;
+    this.surface.show(state.rose);
+  }
+
+  surfaceTitle() { return `Surface E(n) [${unit(this.known.state.rose)}], harmonics to order 6`; }
+
+  async mohr() {
+    const { state, count, domain } = this.known;
+    await this.chart("mohr", mohrFigure, JSON.stringify([count, domain && [domain.z_min, domain.z_max]]), lacking(state));
+  }
+
+  async path() {
+    const { domain, version, held, missing } = this.known;
+    const key = JSON.stringify([version, this.view.plane, this.view.definition, this.view.theme, domain && [domain.z_min, domain.z_max], held, this.within()]);
+    const figure = (known) => {
+      const made = pathFigure(known);
+      if (made && held) {
+        Object.assign(made.layout.xaxis, { range: held.x, autorange: false });
+        Object.assign(made.layout.yaxis, { range: held.y, autorange: false });
+      }
+      return made;
+    };
+    await this.chart("path", figure, key, missing || "no series, so no path", () => { rings($("path-chart"), marks(this.known)); this.handles.draw(); });
+    this.pathWords();
+  }
+
+  // What the axes must reach beyond what they show, while the user has not chosen them.
+  within() {
+    const { xaxis, yaxis } = $("path-chart")._fullLayout || {};
+    const found = marks(this.known);
+    const inside = (axis, value) => !axis.autorange || (value - axis.range[0]) * (value - axis.range[1]) <= 0;
+    if (!xaxis || found.every((one) => inside(xaxis, one.z) && inside(yaxis, one.y))) return "within";
+    return found.map((one) => [one.z, one.y]);
+  }
+
+  pathWords() {
+    const { domain, fitted, state } = this.known;
+    const own = domain !== fitted;
+    const limit = (name) => {
+      const interval = !own && fitted.intervals && fitted.intervals[name];
+      return `${name} = ${domain[name].toFixed(3)}${interval && interval[0] !== null ? ` [${interval.map((z) => z.toFixed(3)).join(", ")}]` : ""}`;
+    };
+    $("limits").textContent = domain ? `${limit("z_min")}, ${limit("z_max")}${own ? ` (fitted ${fitted.z_min.toFixed(3)}, ${fitted.z_max.toFixed(3)})` : ""}` : "";
+    $("limits").title = domain ? "limits of the accessible domain [interval of 95 %]" : this.known.fitMissing || "";
+    $("where").textContent = domain ? where(domain, state.point) : `no domain: ${this.known.fitMissing || "nothing is fitted"}`;
+    $("where").parentElement.classList.toggle("none", !domain);
+    $("where").title = $("where").textContent;
+    $("fitted").hidden = !own;
+  }
+
+  // What the handles may reach: not beyond each other, and one fitted width around.
+  limits() {
+    const { domain, fitted } = this.known;
+    if (!domain) return null;
+    const wide = fitted.z_max - fitted.z_min;
+    return {
+      z_min: { value: domain.z_min, least: Math.max(fitted.z_min - wide, 0.05), most: domain.z_max - 0.01 },
+      z_max: { value: domain.z_max, least: domain.z_min + 0.01, most: fitted.z_max + wide },
+    };
+  }
+
+  // The range of the path's axes, to stand still while a limit is dragged.
+  ranges() {
+    const { xaxis, yaxis } = $("path-chart")._fullLayout || {};
+    return xaxis ? { x: [...xaxis.range], y: [...yaxis.range] } : null;
+  }
+
+  async series() {
+    const { version, eps, seriesMissing } = this.known;
+    const key = JSON.stringify([version, this.view.definition, this.view.run, this.view.theme]);
+    await this.chart("series", seriesFigure, key, seriesMissing || "no series", () => cursor($("series-chart"), this.known.eps ?? eps));
+  }
+
+  async changes() {
+    const words = changesWords(this.known);
+    await this.chart("changes", changesFigure, String(this.known.count), words || "asked for …");
+    $("changes-words").textContent = $("changes").classList.contains("empty") ? "" : words;
+    $("changes-words").title = words;
+  }
+
+  jumpSeries(x) {
+    const drawn = plane($("series-chart"));
+    const own = this.known.series[this.view.run];
+    if (!drawn || !own || x < drawn.left || x > drawn.right) return;
+    if (strained(own)) this.act.jump(nearest(this.known.overview.frames.eps_q, drawn.fromX(x)));
+  }
+
+  jumpPath(x, y) {
+    const drawn = plane($("path-chart"));
+    const own = this.known.series[this.view.run];
+    const [z, a] = own ? [own.columns[this.view.definition], own.columns.a_signed] : [];
+    if (!drawn || !z || !a || !strained(own)) return;
+    let best = [30, -1]; // pixels: a click beside the path is none
+    z.forEach((value, k) => {
+      if (value === null || a[k] === null) return;
+      const away = Math.hypot(drawn.x(value) - x, drawn.y(this.view.plane === "az" ? a[k] * value : a[k]) - y);
+      if (away < best[0]) best = [away, k];
+    });
+    if (best[1] >= 0) this.act.jump(nearest(this.known.overview.frames.eps_q, own.columns.eps_q[best[1]]));
+  }
+
+  // A picture of a panel, its marks included.
+  async picture(name, type) {
+    const { state, eps } = this.known;
+    if (name === "rose" && $("rose").classList.contains("surface")) return this.surface.picture(type, this.surfaceTitle());
+    const figure = this.figures[name];
+    if (name === "path") return picture({ ...figure, data: [...figure.data, ...markTraces(marks(this.known))] }, type);
+    if (name === "series") return picture({ ...figure, layout: { ...figure.layout, shapes: cursorShape(eps) } }, type);
+    const more = name === "rose" ? ` (z = ${state.rose.z.toFixed(3)})` : "";
+    return picture({ ...figure, title: figure.title + more }, type);
+  }
+
+  // Everything is drawn anew: the theme or the size of the letters has changed.
+  stale() { this.drawn = {}; }
 }
 
-export function drawSeries(where, series, eps, definition) {
-  const colours = theme();
-  const columns = [[definition, "z [-]"], ["a_signed", "a' [-]"], ["q_over_p", "q/p [-]"], ["phi", "φ [-]"]];
-  const strain = series.columns.eps_q;
-  const x = strain && strain.some((e) => e !== null) ? strain : (strain || []).map((_, k) => k);
-  const traces = columns.map(([name], k) => ({
-    mode: "lines", x, y: series.columns[name] || [], yaxis: `y${k || ""}`.replace("y0", "y").replace(/^y([1-9])$/, (_, n) => `y${Number(n) + 1}`),
-    line: { color: CYCLE[k], width: 1.4 }, hovertemplate: "%{x:.4f}: %{y:.4f}<extra></extra>",
+// Why a state has neither rose nor Mohr circle.
+function lacking(state) {
+  const { rattler_fraction: rattlers, contact_count: count } = state.values;
+  if (count === 0) return "there are no contacts under this criterion";
+  return rattlers === 1 ? "every grain is a rattler under this criterion, so no contact counts" : state.missing || "there are no contacts";
+}
+
+function titled(section, text) {
+  const title = section.querySelector("h2");
+  title.replaceChildren();
+  title.title = text.replace(/<[^>]*>/g, "");
+  text.split(/<sub>(.*?)<\/sub>/).forEach((part, k) => title.append(k % 2 ? Object.assign(document.createElement("sub"), { textContent: part }) : part));
+}
+
+// What the colours and marks of a chart stand for.
+function keyed(place, keys) {
+  place.replaceChildren(...keys.map(({ name, colour, kind }) => {
+    const [item, sign] = [document.createElement("span"), document.createElement("i")];
+    sign.className = kind;
+    sign.style.color = colour;
+    if (kind === "star") sign.textContent = "★";
+    item.append(sign, name.replace(/<[^>]*>/g, ""));
+    return item;
   }));
-  const more = { title: title(`Series against ${x === strain ? "ε<sub>q</sub>" : "the frame"}`), xaxis: { title: { text: x === strain ? "ε<sub>q</sub> [-]" : "frame" }, anchor: "y4" } };
-  columns.forEach(([, text], k) => {
-    const top = 1 - k / 4;
-    more[`yaxis${k ? k + 1 : ""}`] = { domain: [top - 0.22, top], title: { text, font: { size: 11 } }, nticks: 3, tickfont: { size: 10 } };
-  });
-  more.shapes = eps === null ? [] : [{ type: "line", xref: "x", yref: "paper", x0: eps, x1: eps, y0: 0, y1: 1, line: { color: colours.mark, width: 1.5 } }];
-  return put(where, traces, more);
 }
