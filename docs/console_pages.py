@@ -1,4 +1,4 @@
-"""Pages whose commands are run: ``python docs/console_pages.py docs/start.md`` writes what they print.
+"""Pages whose commands are run; ``python docs/console_pages.py PAGE.md`` writes what they print.
 
 A console block holds commands behind ``$ `` and below each what it prints on standard output; a
 line of an ellipsis stands for lines left out, and a command without any is not shown. The tests run
@@ -46,7 +46,7 @@ def commands(block: str) -> Iterator[Command]:
 
 @dataclass(frozen=True)
 class Shell:
-    """Runs lines by bash in a folder, where ``granufab`` is the package that this Python imports."""
+    """Runs lines by bash in a folder; ``granufab`` is the package that this Python imports."""
 
     folder: Path
 
