@@ -1,4 +1,4 @@
-"""The commands of questions.md and concepts.md run on a small run and its tables."""
+"""The commands of questions.md, of concepts.md and of the first lines of other pages run."""
 
 from __future__ import annotations
 
@@ -20,12 +20,22 @@ from granufab.simulate.settings import to_toml
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PAGES = ("questions.md", "concepts.md")
+OPENINGS = [
+    (page.name, " ".join(span.split()))
+    for page in sorted(DOCS.glob("*.md"))
+    if page.name not in PAGES
+    for span in re.findall(
+        r"`(granufab [^`]*?\brun\.h5[^`]*)`", page.read_text("utf-8").split("\n## ")[0]
+    )
+]
+"""Commands within the text above the first heading, where a page says how it is reached."""
 LINES = [
     (page, command.line)
     for page in PAGES
     for _, text in blocks(DOCS / page, "console")
     for command in commands(text)
 ]
+LINES += list(dict.fromkeys(OPENINGS))
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +79,8 @@ def test_console_blocks_are_all_there_is() -> None:
     for page in PAGES:
         languages = set(re.findall(r"^```(\w+)", (DOCS / page).read_text("utf-8"), re.MULTILINE))
         assert languages == {"console"}, page
-    assert len(LINES) > 20
+    assert len(LINES) - len(set(OPENINGS)) > 20
+    assert len(set(OPENINGS)) > 8
 
 
 def test_every_extra_stands_on_the_page() -> None:
