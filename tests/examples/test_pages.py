@@ -44,8 +44,8 @@ def test_links_and_pictures_exist(page: Path) -> None:
 
 
 def test_every_page_with_an_example_is_run() -> None:
-    # test_page.py of states, test_formats_page.py, test_campaigns_page.py
-    elsewhere = {"states", "evolution", "formats", "campaigns"}
+    # test_page.py of states, test_{formats,campaigns,start,definitions}_page.py
+    elsewhere = {"states", "evolution", "formats", "campaigns", "start", "definitions"}
     signatures = {"api", "architecture"}
     pages = {page.stem for page in PAGES if "```python" in page.read_text(encoding="utf-8")}
     assert pages == set(RUN_EXAMPLES) | elsewhere | signatures

@@ -40,6 +40,7 @@ def export(
     force: Annotated[bool, typer.Option("--force", help="Replace OUT if it exists.")] = False,
 ) -> None:
     """Write states for ParaView, OVITO, LAMMPS, YADE, ON-DEM tools, or as CSV."""
+    from granufab.cli.output import listed
     from granufab.io import write
 
     opened = open_run(files, replace(foreign, format=input_format))
@@ -48,4 +49,4 @@ def export(
         what = opened.run.frames[frame_place(opened.run, opened.name, frame)].packing
     written = write(what, out, format=format, force=force)
     print_summaries([opened])
-    print(f"wrote {', '.join(str(file) for file in written)}")
+    print(f"wrote {listed(written)}")

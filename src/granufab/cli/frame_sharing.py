@@ -18,7 +18,7 @@ Workers = Annotated[
 ]
 DaskWorkers = Annotated[
     str | None,
-    typer.Option(metavar="local|ADDRESS", help="Share them on Dask workers (granufab[sweep])."),
+    typer.Option(metavar="local|ADDRESS", help="Share them on Dask workers (extra: sweep)."),
 ]
 
 

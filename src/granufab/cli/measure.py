@@ -84,7 +84,7 @@ def measure(
     force: Annotated[bool, typer.Option("--force", help="Replace --out if it exists.")] = False,
 ) -> None:
     """Measure z, fabric tensors, anisotropy and stress of every recorded state."""
-    from granufab.cli.output import print_json, print_rows
+    from granufab.cli.output import listed, print_json, print_rows
 
     check_table(out, force)
     opened = open_runs(files, foreign)
@@ -100,8 +100,7 @@ def measure(
     for one, table in zip(opened, tables, strict=True):
         names = [name for name in SHOWN if name in table.variables]
         rows = [[state[name] for name in names] for state in _states(table)]
-        names_of = " + ".join(str(file) for file in one.files)
-        title = f"{names_of}; contacts: {table.attrs['criterion']}; fabric of: {z_definition}"
+        title = f"{listed(one.files, ' + ')}; contacts: {table.attrs['criterion']}; fabric of: {z_definition}"
         print_rows(title, [SHOWN[name] for name in names], rows)
 
 

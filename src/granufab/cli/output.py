@@ -5,14 +5,24 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-__all__ = ["print_json", "print_pairs", "print_rows"]
+__all__ = ["listed", "print_json", "print_pairs", "print_rows"]
 
 WIDTH_OFF_A_TERMINAL = 140
+LISTED_IN_FULL = 3
+
+
+def listed(files: Sequence[Path], between: str = ", ") -> str:
+    """Names of files; of many the first, the last, and how many there are."""
+    names = [str(file) for file in files]
+    if len(names) <= LISTED_IN_FULL:
+        return between.join(names)
+    return f"{names[0]} … {names[-1]} ({len(names)} files)"
 
 
 def print_json(value: Any) -> None:

@@ -28,7 +28,7 @@ def sweep(
     ] = None,
     dask: Annotated[
         str | None,
-        typer.Option(metavar="local|ADDRESS|slurm|pbs|sge", help="Run on Dask: granufab[sweep]."),
+        typer.Option(metavar="local|ADDRESS|slurm|pbs|sge", help="Run on Dask (extra: sweep)."),
     ] = None,
     manifest: Annotated[
         bool, typer.Option("--manifest", help="Write job scripts instead of running.")
