@@ -38,9 +38,11 @@ def blocks(page: Path, *languages: str) -> list[tuple[str, str]]:
 
 
 def commands(block: str) -> Iterator[Command]:
-    """The commands of a console block."""
+    """The commands of a console block; a line that ends with a backslash goes on in the next."""
     for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
         line, *printed = part.rstrip("\n").split("\n")
+        while line.endswith("\\") and printed:
+            line += "\n" + printed.pop(0)
         yield Command(line, tuple(printed))
 
 

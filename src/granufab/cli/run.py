@@ -62,7 +62,7 @@ def run(
     ] = False,
     max_walltime: Annotated[
         str | None,
-        typer.Option(metavar="TIME", help="End with a checkpoint after s, m:s, h:mm:s or d-h:mm:s."),
+        typer.Option(metavar="TIME", help="End with a checkpoint after s, m:s, h:mm:s, d-h:mm:s."),
     ] = None,
     dry_run: Annotated[
         bool,
