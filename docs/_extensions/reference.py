@@ -44,19 +44,21 @@ def _names(path: Path) -> list[str]:
 def write_reference(folder: Path) -> None:
     """One page for the state, one for each package, and their list."""
     folder.mkdir(parents=True, exist_ok=True)
-    pages = {"state": ("States, runs and errors", ["packing", "history", "local_problem", "errors"])}
-    modules = {
-        name: [f"granufab.{one}" for one in listed] for name, (_, listed) in pages.items()
-    } | {name: list(public_modules(name)) for name in PACKAGES}
-    titles = {"state": pages["state"][0]} | PACKAGES
+    state = [f"granufab.{name}" for name in ("packing", "history", "local_problem", "errors")]
+    modules = {"state": state} | {name: list(public_modules(name)) for name in PACKAGES}
+    titles = {"state": "States, runs and errors"} | PACKAGES
     for name, listed in modules.items():
-        title = f"{titles[name]}" if name == "state" else f"granufab.{name}: {titles[name].lower()}"
+        title = titles[name]
+        if name != "state":
+            title = f"granufab.{name}: {title.lower()}"
         parts = [title, "=" * len(title), ""]
         for module in listed:
-            parts += [module, "-" * len(module), "", f".. automodule:: {module}", "   :members:", ""]
+            parts += [module, "-" * len(module), ""]
+            parts += [f".. automodule:: {module}", "   :members:", ""]
         _write(folder / f"{name}.rst", "\n".join(parts))
     listed = "\n".join(f"   {name}" for name in modules)
-    head = "Reference\n=========\n\nFrom the docstrings: formulas, shapes, units, errors, sources.\n\n"
+    head = "Reference\n=========\n\n"
+    head += "From the docstrings: formulas, shapes, units, errors, sources.\n\n"
     _write(folder / "index.rst", f"{head}.. toctree::\n   :maxdepth: 1\n\n{listed}\n")
 
 
@@ -65,7 +67,8 @@ def write_commands(page: Path) -> None:
     from granufab.cli.application import app
 
     group: Any = typer.main.get_command(app)
-    parts = ["# Commands", "", "Written from the program; `granufab VERB --help` prints the same.", ""]
+    parts = ["# Commands", ""]
+    parts += ["Written from the program; `granufab VERB --help` prints the same.", ""]
     for name, command in group.commands.items():
         parts += [f"## granufab {name}", "", _plain(command.help), ""]
         parts += _table("argument", [p for p in command.params if p.param_type_name == "argument"])
@@ -81,7 +84,8 @@ def _table(kind: str, parameters: list[Any]) -> list[str]:
     rows = [f"| {kind} | default | |", "|---|---|---|"]
     for one in shown:
         names = one.opts + one.secondary_opts if kind == "option" else [one.metavar or one.name]
-        default = "" if one.default in (None, False, (), []) or callable(one.default) else f"`{one.default}`"
+        unsaid = one.default in (None, False, (), []) or callable(one.default)
+        default = "" if unsaid else f"`{one.default}`"
         text = _plain(getattr(one, "help", "") or "").replace("\n", " ").replace("|", "\\|")
         rows.append(f"| {', '.join(f'`{name}`' for name in names)} | {default} | {text} |")
     return [*rows, ""]

@@ -36,7 +36,7 @@ T = TypeVar("T", float, Array)
 
 
 def fabric_tensor(contacts: Contacts | Array) -> Array:
-    r"""Mean of n\otimes n over the contacts, :math:`F_{ij} = N_c^{-1}\sum_c n_i n_j` [Radjai2012, §2].
+    r"""Mean of n⊗n over the contacts, :math:`F_{ij} = N_c^{-1}\sum_c n_i n_j` [Radjai2012, §2].
 
     Args:
         contacts: contacts, or their normals alone [-], shape (contact_count, D).
