@@ -32,6 +32,7 @@ pages:
 docs:
 	$(PYTHON) docs/write_api.py
 	$(SPHINX) -b html docs build/site
+	$(PYTHON) docs/check_site.py build/site
 
 pdf:
 	$(SPHINX) -b singlehtml docs build/single

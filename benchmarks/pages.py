@@ -28,6 +28,16 @@ def insert(page: str, name: str, table: str) -> None:
     path.write_text(f"{head}{begin}\n{table}\n{end}{tail}", encoding="utf-8")
 
 
+def insert_cell(page: str, name: str, text: str) -> None:
+    """Replace a number within a line, or a cell of a table, between its marks."""
+    path = DOCS / page
+    begin, end = f"<!-- counted: {name} -->", "<!-- end -->"
+    head, found, rest = path.read_text(encoding="utf-8").partition(begin)
+    _, ended, tail = rest.partition(end)
+    assert found and ended, f"{page} has no place {name}"
+    path.write_text(f"{head}{begin}{text}{end}{tail}", encoding="utf-8")
+
+
 def kept(folder: Path, name: str) -> Any:
     """What ``folder/name`` holds, copied into the documentation."""
     data = json.loads((folder / name).read_text(encoding="utf-8"))
@@ -163,12 +173,36 @@ def performance(folder: Path) -> None:
     insert("performance.md", "performance", text)
 
 
+def reliability(folder: Path) -> None:
+    """What the reliability tests counted."""
+    from reliability_page import cells, tables
+
+    entries = kept(folder, "reliability.json")
+    for name, text in cells(entries).items():
+        insert_cell("reliability.md", name, text)
+    for name, text in tables(entries).items():
+        insert("reliability.md", name, text)
+
+
+def paper(folder: Path) -> None:
+    """The short paper on the program."""
+    from claims_page import rows
+    from paper_page import cells
+
+    names = ("figures", "critical-states", "triaxial", "peers", "reliability")
+    data = {name: kept(folder, f"{name}.json") for name in names}
+    count = len(rows(data["figures"], data["triaxial"]))
+    for name, text in {**cells(data), "claims": str(count)}.items():
+        insert_cell("../paper/paper.md", name, text)
+
+
 def main(name: str, folder: Path) -> None:
     """One page, or all of them."""
     pages = {
         "peers": peers, "critical": critical, "convergence": convergence, "triaxial": triaxial,
         "benchmarks": benchmarks, "accuracy": accuracy, "figures": figures, "claims": claims,
-        "performance": performance,
+        "performance": performance, "reliability": reliability,
+        "paper": paper,
     }  # fmt: skip
     for one in pages if name == "all" else [name]:
         pages[one](folder)

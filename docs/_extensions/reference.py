@@ -27,11 +27,25 @@ PACKAGES = {
 SOURCE = Path(granufab.__file__).parent
 
 
-def public_modules(package: str) -> Iterator[str]:
-    """Dotted names of the modules of a package that name something in ``__all__``."""
+def public_modules(package: str) -> Iterator[tuple[str, str]]:
+    """Modules of a package that name something in ``__all__``, and which members to show.
+
+    All members are named by nothing; of a package's own file those it defines, as the rest has
+    modules of its own.
+    """
     for path in sorted((SOURCE / package).rglob("*.py")):
-        if path.name != "__init__.py" and _names(path):
-            yield ".".join(("granufab", *path.relative_to(SOURCE).with_suffix("").parts))
+        names = _names(path)
+        parts = ("granufab", *path.relative_to(SOURCE).with_suffix("").parts)
+        if path.name != "__init__.py":
+            if names:
+                yield ".".join(parts), ""
+        elif own := [name for name in names if name in _functions(path)]:
+            yield ".".join(parts[:-1]), ", ".join(own)
+
+
+def _functions(path: Path) -> set[str]:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
 
 
 def _names(path: Path) -> list[str]:
@@ -44,7 +58,8 @@ def _names(path: Path) -> list[str]:
 def write_reference(folder: Path) -> None:
     """One page for the state, one for each package, and their list."""
     folder.mkdir(parents=True, exist_ok=True)
-    state = [f"granufab.{name}" for name in ("packing", "history", "local_problem", "errors")]
+    named = ("packing", "history", "local_problem", "errors")
+    state = [(f"granufab.{name}", "") for name in named]
     modules = {"state": state} | {name: list(public_modules(name)) for name in PACKAGES}
     titles = {"state": "States, runs and errors"} | PACKAGES
     for name, listed in modules.items():
@@ -52,9 +67,9 @@ def write_reference(folder: Path) -> None:
         if name != "state":
             title = f"granufab.{name}: {title.lower()}"
         parts = [title, "=" * len(title), ""]
-        for module in listed:
+        for module, members in listed:
             parts += [module, "-" * len(module), ""]
-            parts += [f".. automodule:: {module}", "   :members:", ""]
+            parts += [f".. automodule:: {module}", f"   :members: {members}".rstrip(), ""]
         _write(folder / f"{name}.rst", "\n".join(parts))
     listed = "\n".join(f"   {name}" for name in modules)
     head = "Reference\n=========\n\n"

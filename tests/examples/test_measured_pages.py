@@ -14,6 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 DOCS, BENCHMARKS = ROOT / "docs", ROOT / "benchmarks"
 MARKED = "<!-- measured table: "
+SETTINGS = "tests/reliability/test_hostile_settings.py:: slow"
 Renew = Callable[[str], None]
 
 
@@ -24,6 +25,7 @@ def copy(tmp_path: Path) -> Path:
     folder.mkdir()
     for path in (*DOCS.glob("*.md"), *DOCS.glob("*.json")):
         shutil.copy(path, folder)
+    shutil.copytree(ROOT / "paper", tmp_path / "paper")
     return folder
 
 
@@ -39,22 +41,26 @@ def renew(copy: Path, monkeypatch: pytest.MonkeyPatch) -> Renew:
     return lambda name: pages.main(name, copy)
 
 
-def test_every_table_is_what_its_numbers_give(copy: Path, renew: Renew) -> None:
-    marked = [page for page in copy.glob("*.md") if MARKED in page.read_text("utf-8")]
-    assert len(marked) >= 8
-    emptied = 0
-    for page in marked:
-        text, count = re.subn(
-            rf"({MARKED}(.*?) -->\n).*?(<!-- end of \2 -->)",
-            r"\1\3",
-            page.read_text("utf-8"),
-            flags=re.DOTALL,
-        )
-        page.write_text(text, encoding="utf-8")
-        emptied += count
-    assert emptied >= 25
+def _emptied(text: str) -> tuple[str, int]:
+    """A page without its measured tables and counts, and how many they were."""
+    table = rf"({MARKED}(.*?) -->\n).*?(<!-- end of \2 -->)"
+    text, tables = re.subn(table, r"\1\3", text, flags=re.DOTALL)
+    text, counts = re.subn(r"(<!-- counted: \w+ -->).*?(<!-- end -->)", r"\1\2", text)
+    return text, tables + counts
+
+
+def test_every_number_is_what_its_json_gives(copy: Path, renew: Renew) -> None:
+    found = {}
+    for page in (*copy.glob("*.md"), copy.parent / "paper" / "paper.md"):
+        text = page.read_text("utf-8")
+        empty, count = _emptied(text)
+        if count:
+            found[page] = (text, count)
+            page.write_text(empty, encoding="utf-8")
+    assert len(found) >= 10
+    assert sum(count for _, count in found.values()) >= 55
     renew("all")
-    stale = [p.name for p in marked if p.read_text("utf-8") != (DOCS / p.name).read_text("utf-8")]
+    stale = [page.name for page, (text, _) in found.items() if page.read_text("utf-8") != text]
     assert not stale, f"run: make pages ({', '.join(stale)})"
 
 
@@ -65,6 +71,7 @@ def test_every_table_is_what_its_numbers_give(copy: Path, renew: Renew) -> None:
         ("figures", "figures", ("fig6", "fit", "default", "z_min", "value"), "L1 2.469"),
         ("performance", "benchmarks", ("start", "help_seconds"), "9.88 s"),
         ("peers", "peers", ("present", 0, "z_backbone"), "9.876"),
+        ("reliability", "reliability", (SETTINGS, "told", 0, "seconds"), "9.88 s"),
     ],
 )
 def test_another_number_changes_the_page(
