@@ -98,7 +98,7 @@ def test_a_block_without_a_test_is_noticed(tmp_path: Path) -> None:
 
 def _slug(title: str) -> str:
     """The anchor of a heading, as MyST and forges make it."""
-    text = re.sub(r"[`*_]|\[([^\]]*)\]\([^)]*\)", r"\1", title).strip().lower()
+    text = re.sub(r"[`*]|\[([^\]]*)\]\([^)]*\)", r"\1", title).strip().lower()
     return re.sub(r"\s+", "-", re.sub(r"[^\w\s-]", "", text))
 
 
