@@ -1,19 +1,11 @@
-"""Write docs/figures.md's tables and pictures from the result of ``granufab reproduce all``.
-
-python benchmarks/figures_page.py DIR
-"""
+"""The tables of docs/figures.md from what was kept of ``granufab reproduce all``."""
 
 from __future__ import annotations
 
-import json
-import shutil
-import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pages import DOCS, insert
 
 Row = tuple[str, ...]
 Result = dict[str, Any]
@@ -117,7 +109,17 @@ def fig3(result: Result) -> str:
                     else f"modes 4 and 6 hold {100 * left:.1f} % of the power",
                 )
             )
-    return compared(rows)
+    return compared(rows) + "\n\n" + amplitudes(result)
+
+
+def amplitudes(result: Result) -> str:
+    """Amplitude of each mode after shearing."""
+    rows = []
+    for name, states in result["orientation"].items():
+        after = states["after"]
+        pairs = zip(after["amplitude"], after["amplitude_error"], strict=True)
+        rows.append((f"{name}, after", *(f"{size:.2f} ± {error:.2f}" for size, error in pairs)))
+    return table(rows, ("amplitude over that of mode 0", "mode 2", "mode 4", "mode 6"))
 
 
 def fig4(result: Result) -> str:
@@ -262,7 +264,7 @@ def fig7(result: Result) -> str:
 def fig8(result: Result) -> str:
     """By friction."""
     fits = result["fits"]
-    header = ("µ", "z*", "a*", "a*z*", "z_min", "z_max", "approach: slope, z_max")
+    header = ("µ", "z*", "a*", "a\\*z\\*", "z_min", "z_max", "approach: slope, z_max")
     rows = [
         (
             f"{fit['friction']:g}",
@@ -326,13 +328,9 @@ def settings_line(result: Result) -> str:
     )
 
 
-def write(folder: Path) -> None:
-    """Fill the page from ``folder/fig1.json`` … ``fig8.json``, and copy the pictures."""
-    for name, page in PAGES.items():
-        result = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
-        insert("figures.md", name, f"{page(result)}\n\n{settings_line(result)}")
-        shutil.copy(folder / f"{name}.png", DOCS / "images" / f"{name}.png")
-
-
-if __name__ == "__main__":
-    write(Path(sys.argv[1]))
+def tables(results: dict[str, Result]) -> dict[str, str]:
+    """The text between each pair of the page's markers."""
+    return {
+        name: f"{page(results[name])}\n\n{settings_line(results[name])}"
+        for name, page in PAGES.items()
+    }

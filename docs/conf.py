@@ -8,7 +8,7 @@ sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
 
 project = "granufab"
 author = "The granufab authors"
-copyright = "The granufab authors"  # noqa: A001
+copyright = "The granufab authors"
 release = metadata.version("granufab")
 
 extensions = [
@@ -38,4 +38,6 @@ napoleon_use_ivar = True
 html_theme = "furo"
 html_title = f"granufab {release}"
 html_copy_source = False
+html_static_path = ["_static"]
+html_css_files = ["print.css"]
 suppress_warnings = ["ref.python", "config.cache"]

@@ -132,3 +132,31 @@ def _costs(rows: Sequence[Row]) -> list[str]:
 def _against(reference: Sequence[Row], rows: Sequence[Row]) -> str:
     apart, faster = difference(reference, rows, "z_backbone"), ratio(reference, rows)
     return "–" if apart is None else f"{apart:+.3f}, {faster:.3g} ×"
+
+
+def present(rows: Sequence[Row], earlier: Sequence[Row]) -> str:
+    """Rows of the present solver beside the LAMMPS rows of the same samples among earlier ones.
+
+    Args:
+        rows: granufab's, timed after the others.
+        earlier: those of the large table.
+    """
+    if not rows:
+        return "None: all rows above are of this version."
+    names = ("settings", "κ", "residual", "h", "sample", "z_backbone", "CPU s")
+    kappas = (1e4, 1e5)
+    against = [f"Δz, speed against LAMMPS {_kappa(kappa)}" for kappa in kappas]
+    lines = ["| " + " | ".join((*names, *against)) + " |", "|" + "---|" * (len(names) + 2)]
+    for row in sorted(rows, key=lambda r: (not r["role"], *setting_of(r)[3:6], r["seed"])):
+        cells = [row["role"] or "chosen", _kappa(row["kappa"]), f"{row['residual']:.0e}"]
+        cells += [f"{row['time_step_setting']:g}", str(row["seed"])]
+        cells += [f"{row['z_backbone']:.3f}", f"{row['cpu_seconds']:.1f}"]
+        for kappa in kappas:
+            theirs = [one for one in earlier if _is_lammps(one, kappa) and _same_job(one, row)]
+            cells.append(_against(theirs, [row]))
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def _same_job(one: Row, other: Row) -> bool:
+    return all(one[name] == other[name] for name in ("grains", "rate", "strain", "seed"))

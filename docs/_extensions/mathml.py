@@ -1,4 +1,4 @@
-"""Formulas as MathML, which browsers show by themselves: the site needs no network and no script."""
+"""Formulas as MathML, which browsers show by themselves: no network and no script is needed."""
 
 from __future__ import annotations
 

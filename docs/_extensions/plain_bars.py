@@ -17,7 +17,9 @@ def _escaped(line: str) -> str:
     return "".join(part if k % 2 else part.replace("|", r"\|") for k, part in enumerate(parts))
 
 
-def _changed(_app: Sphinx, _what: str, _name: str, _of: Any, _options: Any, lines: list[str]) -> None:
+def _changed(
+    _app: Sphinx, _what: str, _name: str, _of: Any, _options: Any, lines: list[str]
+) -> None:
     lines[:] = [line if line.startswith("..") else _escaped(line) for line in lines]
 
 

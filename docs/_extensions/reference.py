@@ -27,11 +27,25 @@ PACKAGES = {
 SOURCE = Path(granufab.__file__).parent
 
 
-def public_modules(package: str) -> Iterator[str]:
-    """Dotted names of the modules of a package that name something in ``__all__``."""
+def public_modules(package: str) -> Iterator[tuple[str, str]]:
+    """Modules of a package that name something in ``__all__``, and which members to show.
+
+    All members are named by nothing; of a package's own file those it defines, as the rest has
+    modules of its own.
+    """
     for path in sorted((SOURCE / package).rglob("*.py")):
-        if path.name != "__init__.py" and _names(path):
-            yield ".".join(("granufab", *path.relative_to(SOURCE).with_suffix("").parts))
+        names = _names(path)
+        parts = ("granufab", *path.relative_to(SOURCE).with_suffix("").parts)
+        if path.name != "__init__.py":
+            if names:
+                yield ".".join(parts), ""
+        elif own := [name for name in names if name in _functions(path)]:
+            yield ".".join(parts[:-1]), ", ".join(own)
+
+
+def _functions(path: Path) -> set[str]:
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    return {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
 
 
 def _names(path: Path) -> list[str]:
@@ -44,19 +58,22 @@ def _names(path: Path) -> list[str]:
 def write_reference(folder: Path) -> None:
     """One page for the state, one for each package, and their list."""
     folder.mkdir(parents=True, exist_ok=True)
-    pages = {"state": ("States, runs and errors", ["packing", "history", "local_problem", "errors"])}
-    modules = {
-        name: [f"granufab.{one}" for one in listed] for name, (_, listed) in pages.items()
-    } | {name: list(public_modules(name)) for name in PACKAGES}
-    titles = {"state": pages["state"][0]} | PACKAGES
+    named = ("packing", "history", "local_problem", "errors")
+    state = [(f"granufab.{name}", "") for name in named]
+    modules = {"state": state} | {name: list(public_modules(name)) for name in PACKAGES}
+    titles = {"state": "States, runs and errors"} | PACKAGES
     for name, listed in modules.items():
-        title = f"{titles[name]}" if name == "state" else f"granufab.{name}: {titles[name].lower()}"
+        title = titles[name]
+        if name != "state":
+            title = f"granufab.{name}: {title.lower()}"
         parts = [title, "=" * len(title), ""]
-        for module in listed:
-            parts += [module, "-" * len(module), "", f".. automodule:: {module}", "   :members:", ""]
+        for module, members in listed:
+            parts += [module, "-" * len(module), ""]
+            parts += [f".. automodule:: {module}", f"   :members: {members}".rstrip(), ""]
         _write(folder / f"{name}.rst", "\n".join(parts))
     listed = "\n".join(f"   {name}" for name in modules)
-    head = "Reference\n=========\n\nFrom the docstrings: formulas, shapes, units, errors, sources.\n\n"
+    head = "Reference\n=========\n\n"
+    head += "From the docstrings: formulas, shapes, units, errors, sources.\n\n"
     _write(folder / "index.rst", f"{head}.. toctree::\n   :maxdepth: 1\n\n{listed}\n")
 
 
@@ -65,7 +82,8 @@ def write_commands(page: Path) -> None:
     from granufab.cli.application import app
 
     group: Any = typer.main.get_command(app)
-    parts = ["# Commands", "", "Written from the program; `granufab VERB --help` prints the same.", ""]
+    parts = ["# Commands", ""]
+    parts += ["Written from the program; `granufab VERB --help` prints the same.", ""]
     for name, command in group.commands.items():
         parts += [f"## granufab {name}", "", _plain(command.help), ""]
         parts += _table("argument", [p for p in command.params if p.param_type_name == "argument"])
@@ -81,7 +99,8 @@ def _table(kind: str, parameters: list[Any]) -> list[str]:
     rows = [f"| {kind} | default | |", "|---|---|---|"]
     for one in shown:
         names = one.opts + one.secondary_opts if kind == "option" else [one.metavar or one.name]
-        default = "" if one.default in (None, False, (), []) or callable(one.default) else f"`{one.default}`"
+        unsaid = one.default in (None, False, (), []) or callable(one.default)
+        default = "" if unsaid else f"`{one.default}`"
         text = _plain(getattr(one, "help", "") or "").replace("\n", " ").replace("|", "\\|")
         rows.append(f"| {', '.join(f'`{name}`' for name in names)} | {default} | {text} |")
     return [*rows, ""]

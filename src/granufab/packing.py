@@ -20,7 +20,9 @@ from granufab.errors import InvalidPacking, MissingData
 __all__ = ["Array", "Cell", "Contacts", "Grains", "IntArray", "Packing", "WallContacts", "require"]
 
 Array = NDArray[np.float64]
+"""Numbers, of any shape."""
 IntArray = NDArray[np.int64]
+"""Whole numbers, of any shape."""
 T = TypeVar("T")
 
 
@@ -31,6 +33,8 @@ def require(value: T | None, what: str, remedy: str = "") -> T:
         value: a field that its source may lack.
         what: the quantity in words ("contact forces").
         remedy: how the user can supply it.
+    Raises:
+        MissingData: ``value`` is None.
     """
     if value is None:
         raise MissingData(f"{what} are not in this data" + (f"; {remedy}" if remedy else ""))

@@ -7,7 +7,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 
-PACKAGE = Path(__file__).resolve().parents[2] / "src" / "granufab"
+import granufab
+
+PACKAGE = Path(granufab.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 

@@ -41,7 +41,7 @@ def test_an_address_without_a_port_is_refused() -> None:
 
 @pytest.mark.slow
 def test_a_killed_dask_worker_costs_no_case_and_changes_no_number(
-    tmp_path: Path, small: Callable[..., Any]
+    tmp_path: Path, small: Callable[..., Any], tell: Callable[..., None]
 ) -> None:
     pytest.importorskip("distributed", reason="Dask is not installed (extra sweep)")
     if core_count() < 2:
@@ -67,6 +67,7 @@ def test_a_killed_dask_worker_costs_no_case_and_changes_no_number(
     assert len(set(results["case"].values.tolist())) == 24
     run_campaign(sweep, tmp_path / "local")
     xr.testing.assert_identical(results, gather(tmp_path / "local"))
+    tell(cases=24, ended=sum(ended.values()))
 
 
 @pytest.mark.slow

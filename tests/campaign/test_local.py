@@ -37,7 +37,11 @@ def states(folder: Path) -> Counter[str]:
     [((0.2, 0.5), 3), pytest.param((0.1, 0.2, 0.4, 0.8), 6, marks=pytest.mark.slow)],
 )
 def test_a_killed_worker_costs_no_case(
-    frictions: tuple[float, ...], seeds: int, tmp_path: Path, small: Callable[..., Any]
+    frictions: tuple[float, ...],
+    seeds: int,
+    tmp_path: Path,
+    small: Callable[..., Any],
+    tell: Callable[..., None],
 ) -> None:
     killer = counted_case.Killer(after=len(frictions))
     summary = run_campaign(
@@ -56,6 +60,7 @@ def test_a_killed_worker_costs_no_case(
     assert killer.victim is not None
     assert begun.pop(killer.victim) == 2
     assert set(begun.values()) == {1}
+    tell(cases=total, ended=sum(ended.values()))
 
 
 def test_a_case_that_kills_its_workers_fails_and_the_others_go_on(

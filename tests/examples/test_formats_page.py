@@ -66,3 +66,32 @@ def test_snippet(title: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
             assert value == pytest.approx(float(word), abs=0.6 * 10.0**-digits), title
     if title.startswith("Tomography"):
         assert values[0] == 3.0  # each of the eight shares three faces
+
+
+@pytest.mark.parametrize("text", re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL))
+def test_the_column_maps_are_read(text: str, tmp_path: Path) -> None:
+    from granufab.io.column_map import read_column_map
+
+    (tmp_path / "columns.toml").write_text(text, encoding="utf-8")
+    found = read_column_map(tmp_path / "columns.toml")
+    assert found["contacts"]["i"] in ("c_id[1]", 1)
+
+
+def test_damaged_frames_are_skipped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The lines of the interactive example, on an experiment that is sound."""
+    monkeypatch.syspath_prepend(str(ROOT / "tests" / "io"))
+    from one_of_each_binary import EXAMPLES
+
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "DataAnnulus_1"
+    folder.mkdir()
+    EXAMPLES["pegs"](folder)
+    (text,) = re.findall(r"```pycon\n(.*?)```", PAGE, flags=re.DOTALL)
+    assert all(line.startswith(">>> ") for line in text.splitlines())
+    names: dict = {"granufab": granufab}
+    exec(re.sub(r"^>>> ", "", text, flags=re.MULTILINE), names)
+    run = names["run"]
+    assert len(run.frames.numbers) == len(run.frames) > 0
+    assert not run.frames.summary.skipped_frames

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ def test_the_examples_are_what_was_written(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_cuts(tmp_path: Path, name: str) -> None:
+def test_cuts(tmp_path: Path, name: str, tell: Callable[..., None]) -> None:
     example = EXAMPLES[name](tmp_path)
     partial = [
         check_truncations(tmp_path / part.name, example.read, counted=part.counted)
@@ -44,10 +45,12 @@ def test_cuts(tmp_path: Path, name: str) -> None:
     ]
     assert example.series or not any(partial)
     assert name not in STREAMS or min(partial) > 20
+    tell(files=len(example.parts), partial=sum(partial))
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_wrong_bytes(tmp_path: Path, name: str) -> None:
+def test_wrong_bytes(tmp_path: Path, name: str, tell: Callable[..., None]) -> None:
     example = EXAMPLES[name](tmp_path)
     refused = [check_mutations(tmp_path / part.name, example.read) for part in example.parts]
     assert sum(refused) > 0
+    tell(files=len(example.parts), refused=sum(refused))

@@ -12,6 +12,7 @@ import sys
 import time
 import warnings
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -143,46 +144,41 @@ def _mutations(outcomes: Outcomes, count: int, seed: int) -> None:
         outcomes.read(bad)
 
 
-def _report(what: str, file: Path, outcomes: Outcomes) -> None:
-    counts = ", ".join(f"{count} {name}" for name, count in sorted(outcomes.counts.items()))
-    print(f"{what}, {len(outcomes.whole)} bytes: {counts}, 0 different")
-
-
-def test_mutations_are_never_silent(file: Path) -> None:
+def test_mutations_are_never_silent(file: Path, tell: Callable[..., None]) -> None:
     outcomes = Outcomes(file)
     _mutations(outcomes, 100, 9)
-    _report("mutations", file, outcomes)
+    tell(**outcomes.counts)
     assert outcomes.counts["same"] < 70
     assert outcomes.counts["refused"] + outcomes.counts["some frames"] > 30
 
 
 @pytest.mark.slow
-def test_many_mutations_are_never_silent(file: Path) -> None:
+def test_many_mutations_are_never_silent(file: Path, tell: Callable[..., None]) -> None:
     outcomes = Outcomes(file)
     _mutations(outcomes, 700, 10)
-    _report("mutations", file, outcomes)
+    tell(**outcomes.counts)
 
 
-def test_truncations_open_to_what_is_there(file: Path) -> None:
+def test_truncations_open_to_what_is_there(file: Path, tell: Callable[..., None]) -> None:
     outcomes = Outcomes(file)
     length = len(outcomes.whole)
     for size in np.linspace(0, length - 1, 60).astype(int):
         outcomes.read(outcomes.whole[:size])
-    _report("truncations", file, outcomes)
+    tell(**outcomes.counts)
     assert outcomes.counts["same"] <= (0 if outcomes.content[2] else 3)
     assert outcomes.counts["refused"] > 0
     assert outcomes.counts["shorter"] > 3
 
 
 @pytest.mark.slow
-def test_many_truncations_open_to_what_is_there(file: Path) -> None:
+def test_many_truncations_open_to_what_is_there(file: Path, tell: Callable[..., None]) -> None:
     outcomes = Outcomes(file)
     for size in np.random.default_rng(3).integers(0, len(outcomes.whole), 400):
         outcomes.read(outcomes.whole[:size])
-    _report("truncations", file, outcomes)
+    tell(**outcomes.counts)
 
 
-def test_every_byte_of_the_small_numbers_is_covered(file: Path) -> None:
+def test_every_byte_of_the_small_numbers_is_covered(file: Path, tell: Callable[..., None]) -> None:
     """Each stored number without HDF5's own checksum, changed, is told or changes nothing."""
     outcomes = Outcomes(file)
     places = []
@@ -206,7 +202,7 @@ def test_every_byte_of_the_small_numbers_is_covered(file: Path) -> None:
         bad = bytearray(outcomes.whole)
         bad[place] ^= 0x11
         told += outcomes.read(bad) != "same"
-    _report(f"{len(places)} small numbers", file, outcomes)
+    tell(places=len(places), **outcomes.counts)
     assert told > 0.6 * len(places)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -114,7 +115,7 @@ def _with_full_disk(case: Path, out: Path, size: int) -> subprocess.CompletedPro
     [pytest.param(0.35, marks=pytest.mark.slow), 0.6, pytest.param(0.95, marks=pytest.mark.slow)],
 )
 def test_a_full_disk_ends_the_run_in_one_line_and_it_resumes(
-    share: float, whole: Path, tmp_path: Path
+    share: float, whole: Path, tmp_path: Path, tell: Callable[..., None]
 ) -> None:
     """Files may grow to a share of the whole run file; the rest of the run follows later."""
     case, out = tmp_path / "case.toml", tmp_path / "out"
@@ -126,7 +127,7 @@ def test_a_full_disk_ends_the_run_in_one_line_and_it_resumes(
     assert str(out) in done.stderr
     assert "Traceback" not in done.stderr
     frames = len(gf.read(out / "run.h5").frames) if (out / "run.h5").exists() else 0
-    print(f"disk full at {size} bytes: {frames} frames kept; {done.stderr.strip()}")
+    tell(share=share, frames=frames)
     if (out / CHECKPOINT).exists():
         assert read_checkpoint(out / CHECKPOINT).notes["frames"] <= frames
     assert not [path for path in out.iterdir() if path.suffix in (".tmp", ".part")]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import string
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -79,12 +79,9 @@ def _assignment(key: str, text: str) -> str:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def counts() -> Iterator[None]:
+def counts(tell_of_all: Callable[..., None]) -> Iterator[None]:
     yield
-    print(
-        f"\nhostile settings: {COUNTS['refused']} refused in one line, {COUNTS['read']} read, "
-        f"slowest {COUNTS['seconds']:.2f} s"
-    )
+    tell_of_all(**COUNTS)
 
 
 @pytest.mark.parametrize("value", ["nan", "-nan", "inf", "-inf", "-1.0", "-1e300"])

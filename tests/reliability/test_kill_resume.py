@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
@@ -64,8 +64,8 @@ def end_after(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
 
 def resumed_from(
     counts: Sequence[int], kind: str, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """End a run at its checkpoints of these numbers, and let it go on."""
+) -> int:
+    """End a run at its checkpoints of these numbers, and let it go on; returns how many."""
     case, tmp_path = KINDS[kind], folder
     run_into_folder(case, tmp_path / "whole")
     wanted, ended = digest(tmp_path / "whole"), 0
@@ -82,26 +82,32 @@ def resumed_from(
         assert digest(folder) == wanted, count
         assert result.summary["resumed"] == 1
         assert sorted(path.name for path in folder.iterdir()) == sorted(RUN_FILES)
-    print(f"{kind}: ended at {ended} checkpoints, resumed to the same bits")
     assert ended == len(counts)
+    return ended
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_from_some_checkpoints_the_same_end(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tell: Callable[..., None]
 ) -> None:
     monkeypatch.setenv("GRANUFAB_THREADS", "2")
-    resumed_from((1, 6, 11, 19) if kind == "disks" else (9,), kind, tmp_path, monkeypatch)
+    counts = (1, 6, 11, 19) if kind == "disks" else (9,)
+    tell(checkpoints=resumed_from(counts, kind, tmp_path, monkeypatch), threads=2)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("threads", ["1", "2"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_from_every_checkpoint_the_same_end(
-    kind: str, threads: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    kind: str,
+    threads: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    tell: Callable[..., None],
 ) -> None:
     monkeypatch.setenv("GRANUFAB_THREADS", threads)
-    resumed_from(range(1, 21), kind, tmp_path, monkeypatch)
+    ended = resumed_from(range(1, 21), kind, tmp_path, monkeypatch)
+    tell(checkpoints=ended, threads=int(threads))
 
 
 CHILD = """
@@ -177,11 +183,11 @@ def kills(folder: Path, count: int, seed: int) -> tuple[int, int]:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 @pytest.mark.parametrize("count", [3, pytest.param(20, marks=pytest.mark.slow)])
-def test_killed_at_any_time_the_same_end(count: int, tmp_path: Path) -> None:
+def test_killed_at_any_time_the_same_end(
+    count: int, tmp_path: Path, tell: Callable[..., None]
+) -> None:
     number, in_writes = kills(tmp_path, count, seed=count)
-    print(
-        f"{count} of {number} runs killed, {in_writes} inside writes; all ended with the same bits"
-    )
+    tell(runs=number, killed=count, inside_writes=in_writes)
     assert in_writes >= count // 4
 
 

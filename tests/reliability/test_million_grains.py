@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -42,8 +43,8 @@ print(base, peak(), simulation.candidates.count / count, simulation.searches)
 """
 
 
-def _peak(count: int, dimension: int, steps: int) -> tuple[float, float]:
-    """Memory of the process before, and of a grain at the largest moment [bytes]."""
+def _peak(count: int, dimension: int, steps: int, tell: Callable[..., None]) -> float:
+    """Memory of a grain at the largest moment, above that of the process before [bytes]."""
     done = subprocess.run(
         [sys.executable, "-c", COMPACTION, str(count), str(dimension), str(steps)],
         capture_output=True,
@@ -53,11 +54,9 @@ def _peak(count: int, dimension: int, steps: int) -> tuple[float, float]:
     )
     base, peak, pairs, searches = map(float, done.stdout.split())
     grain = (peak - base) / count
-    print(
-        f"\n{count} grains in {dimension}D, {steps} compaction steps, {searches:.0f} searches: "
-        f"{grain:.0f} B a grain above {base / 1e6:.0f} MB; {pairs:.2f} pairs a grain"
-    )
-    return base, grain
+    tell(grains=count, dimension=dimension, steps=steps, bytes=grain, base=base, searches=searches)
+    assert pairs > 1
+    return grain
 
 
 needs_proc = pytest.mark.skipif(
@@ -67,21 +66,23 @@ needs_proc = pytest.mark.skipif(
 
 @needs_proc
 @pytest.mark.parametrize(("dimension", "count"), [(2, 20_000), (3, 6_000)])
-def test_the_preflight_promises_no_less_than_compaction_takes(dimension: int, count: int) -> None:
-    _, grain = _peak(count, dimension, 60)
+def test_the_preflight_promises_no_less_than_compaction_takes(
+    dimension: int, count: int, tell: Callable[..., None]
+) -> None:
+    grain = _peak(count, dimension, 60, tell)
     assert grain * count < FIXED_BYTES + GRAIN_BYTES[dimension] * count
     assert grain > 300, "less than positions, contacts and slots can take"
 
 
 @pytest.mark.slow
 @needs_proc
-def test_a_million_disks_stay_under_1200_bytes_a_grain() -> None:
-    _, grain = _peak(1_000_000, 2, 200)
-    assert grain < 1200
+def test_a_million_disks_stay_under_1200_bytes_a_grain(tell: Callable[..., None]) -> None:
+    assert _peak(1_000_000, 2, 200, tell) < 1200
 
 
 @pytest.mark.slow
 @needs_proc
-def test_a_hundred_thousand_spheres_stay_within_what_the_preflight_promises() -> None:
-    _, grain = _peak(100_000, 3, 200)
-    assert grain < GRAIN_BYTES[3]
+def test_a_hundred_thousand_spheres_stay_within_what_the_preflight_promises(
+    tell: Callable[..., None],
+) -> None:
+    assert _peak(100_000, 3, 200, tell) < GRAIN_BYTES[3]

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -47,26 +48,30 @@ def _peak(verb: str, path: Path) -> float:
     return float(done.stderr.splitlines()[-1]) * 1024
 
 
-def _grows_by_less_than_four_frames(folder: Path, side: int, frames: int) -> None:
+def _grows_by_less_than_four_frames(
+    folder: Path, side: int, frames: int, tell: Callable[..., None]
+) -> None:
     short, long = folder / "short.h5", folder / "long.h5"
     size = frame_bytes(write_lattice_run(short, side, 4))
     write_lattice_run(long, side, frames)
     for verb in ("measure", "balance"):
         growth = _peak(verb, long) - _peak(verb, short)
-        file = f"{side**2} grains, {frames} instead of 4 frames, {long.stat().st_size / 1e6:.0f} MB"
-        print(f"{verb}: {file}: {growth / 1e6:+.1f} MB, {growth / size:.2f} frames")
+        megabytes = long.stat().st_size / 1e6
+        tell(verb=verb, frames=frames, megabytes=megabytes, grown_frames=growth / size)
         assert growth < 4 * size < (frames - 4) * size / 2
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
-def test_a_longer_run_takes_no_more_memory(tmp_path: Path) -> None:
-    _grows_by_less_than_four_frames(tmp_path, 140, 24)
+def test_a_longer_run_takes_no_more_memory(tmp_path: Path, tell: Callable[..., None]) -> None:
+    _grows_by_less_than_four_frames(tmp_path, 140, 24, tell)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
-def test_a_run_file_of_300_megabytes_takes_no_more_memory(tmp_path: Path) -> None:
-    _grows_by_less_than_four_frames(tmp_path, 220, 90)
+def test_a_run_file_of_300_megabytes_takes_no_more_memory(
+    tmp_path: Path, tell: Callable[..., None]
+) -> None:
+    _grows_by_less_than_four_frames(tmp_path, 220, 90, tell)
 
 
 @pytest.fixture(scope="module")
@@ -148,8 +153,8 @@ def test_bad_workers_end_in_one_line(
 
 
 @pytest.mark.slow
-def test_seconds_of_two_workers(tmp_path: Path) -> None:
-    """Printed, not asserted: it depends on who else uses the machine."""
+def test_seconds_of_two_workers(tmp_path: Path, tell: Callable[..., None]) -> None:
+    """Told, not asserted: it depends on who else uses the machine."""
     path = tmp_path / "run.h5"
     write_lattice_run(path, 200, 40)
     opened, seconds = gf.read(path), []
@@ -159,5 +164,5 @@ def test_seconds_of_two_workers(tmp_path: Path) -> None:
             began = time.perf_counter()
             measure_run(opened, each=each)
             seconds.append(time.perf_counter() - began)
-    print(f"measure 40 frames of 40,000 grains: {seconds[0]:.2f} s, 2 workers {seconds[1]:.2f} s")
+    tell(frames=40, grains=40_000, one=seconds[0], two=seconds[1])
     assert min(seconds) > 0

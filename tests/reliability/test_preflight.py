@@ -6,6 +6,7 @@ import os
 import resource
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -135,7 +136,9 @@ def test_a_refused_run_keeps_the_results_that_force_would_replace(
     assert (out / "run.h5").read_bytes() == b"earlier"
 
 
-def test_a_hundred_million_grains_are_refused_in_one_line(tmp_path: Path) -> None:
+def test_a_hundred_million_grains_are_refused_in_one_line(
+    tmp_path: Path, tell: Callable[..., None]
+) -> None:
     """In a process that may have 4 GB, for real; nothing is allocated."""
     program = (
         "import resource, sys; resource.setrlimit(resource.RLIMIT_AS, (2**32, 2**32)); "
@@ -154,11 +157,12 @@ def test_a_hundred_million_grains_are_refused_in_one_line(tmp_path: Path) -> Non
     assert done.stderr.count("\n") == 1
     assert "sample.grain_count = 100000000" in done.stderr
     assert "270 GB of memory" in done.stderr
+    tell(grains=100_000_000, limit=2**32, needed="270 GB")
     assert "ulimit -v" in done.stderr
     assert not (tmp_path / "case" / "run.h5").exists()
 
 
-def test_steps_and_records_are_those_of_the_run(tmp_path: Path) -> None:
+def test_steps_and_records_are_those_of_the_run(tmp_path: Path, tell: Callable[..., None]) -> None:
     """And the disk is at least what the run leaves."""
     demand = demand_of(SMALL)
     run = run_into_folder(SMALL, tmp_path / "out")
@@ -167,7 +171,7 @@ def test_steps_and_records_are_those_of_the_run(tmp_path: Path) -> None:
     assert len(run.frames) == demand.frames
     assert run.series.sizes["record"] == pytest.approx(demand.rows, abs=1)
     held = sum(path.stat().st_size for path in (tmp_path / "out").iterdir())
-    print(f"run of {demand.frames} frames: {held} bytes, expected at most {demand.disk}")
+    tell(frames=demand.frames, held=held, expected=demand.disk)
     assert held <= demand.disk
 
 

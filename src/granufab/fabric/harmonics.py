@@ -116,6 +116,8 @@ def sphere_density(
         orders: of the sum; default all that ``sphere`` holds.
     Returns:
         Shape (...); it can dip below 0 where the contacts are rare.
+    Raises:
+        InvalidSettings: an order that ``sphere`` does not hold.
     """
     direction = np.asarray(direction, dtype=np.float64)
     total = np.ones(direction.shape[:-1])

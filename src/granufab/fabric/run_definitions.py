@@ -24,6 +24,11 @@ def run_definitions(
 
     A run without friction holds its grains by D + 1 contacts, any other by 2.
 
+    Args:
+        run: with the settings it was recorded with, if any.
+        criterion: what counts as a contact, instead of the run's.
+        z_definition: which grains count, instead of the run's.
+        minimum: fewest contacts of a grain that is no rattler.
     Raises:
         InvalidSettings: an unknown criterion or definition.
     """

@@ -36,7 +36,7 @@ T = TypeVar("T", float, Array)
 
 
 def fabric_tensor(contacts: Contacts | Array) -> Array:
-    r"""Mean of n\otimes n over the contacts, :math:`F_{ij} = N_c^{-1}\sum_c n_i n_j` [Radjai2012, §2].
+    r"""Mean of n⊗n over the contacts, :math:`F_{ij} = N_c^{-1}\sum_c n_i n_j` [Radjai2012, §2].
 
     Args:
         contacts: contacts, or their normals alone [-], shape (contact_count, D).
@@ -109,9 +109,9 @@ def signed_anisotropy(fabric: Array, direction: Array, *, minor: Array | None = 
     r"""Anisotropy along a fixed direction d [-], negative where contacts avoid d.
 
     2D: :math:`a' = 2\langle\cos 2(\theta-\theta_0)\rangle = 2(2\,d\cdot F\cdot d - 1)`;
-    3D, about an axis of symmetry: :math:`a' = \frac54\langle 3(n\cdot d)^2 - 1\rangle`. With a second
-    axis e, for true triaxial states: 2(d·F·d − e·F·e) in 2D, (5/2)(d·F·d − e·F·e) in 3D, which
-    is the unsigned a where d and e are the major and the minor principal direction.
+    3D, about an axis of symmetry: :math:`a' = \frac54\langle 3(n\cdot d)^2 - 1\rangle`. With a
+    second axis e, for true triaxial states: 2(d·F·d − e·F·e) in 2D, (5/2)(d·F·d − e·F·e) in 3D,
+    which is the unsigned a where d and e are the major and the minor principal direction.
 
     Args:
         fabric: fabric tensor, shape (D, D).

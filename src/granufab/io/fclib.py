@@ -71,7 +71,14 @@ def read_fclib_solution(path: Path | str) -> LocalState | None:
 
 
 def read_fclib_guesses(path: Path | str) -> list[LocalState]:
-    """The initial guesses in an FCLIB file; raises as :func:`read_fclib`."""
+    """The initial guesses in an FCLIB file.
+
+    Args:
+        path: of the file.
+    Raises:
+        CorruptFile: the file is damaged or holds fewer guesses than it says.
+        UnknownFormat: it is no FCLIB file.
+    """
     with _opened(Path(path)) as file:
         if "guesses" not in file.root:
             return []

@@ -45,6 +45,7 @@ class Format:
 FORMATS: tuple[Format, ...] = (
     Format(name="granufab run file", matches=is_run_file, read=read_run),
 )
+"""Formats that are recognised before those of other programs."""
 
 
 def detect(path: Path | str) -> Format | ForeignFormat:

@@ -90,6 +90,9 @@ def read_series(path: Path | str) -> xr.Dataset:
 def write_dataset(dataset: xr.Dataset, path: Path | str) -> None:
     """Write a dataset as ``.csv`` (one row per item of its only dimension) or ``.nc`` (NetCDF 3).
 
+    Args:
+        dataset: with one dimension for a CSV.
+        path: its ending chooses the format.
     Raises:
         InvalidSettings: another suffix, more than one dimension in a CSV, or the file cannot be
             written.

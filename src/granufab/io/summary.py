@@ -87,6 +87,9 @@ def replacing(path: Path | str) -> Iterator[Path]:
 def write_text(text: str, path: Path | str) -> None:
     """Write ``text`` as UTF-8 to ``path``, whole or not at all.
 
+    Args:
+        text: the whole content.
+        path: of the file, replaced if it exists.
     Raises:
         InvalidSettings: the file cannot be written.
     """
@@ -97,6 +100,9 @@ def write_text(text: str, path: Path | str) -> None:
 def write_json(data: Any, path: Path | str) -> None:
     """Write ``data`` as strict JSON to ``path``, whole or not at all; NaN and ±∞ become null.
 
+    Args:
+        data: dicts, lists, numbers, texts, also numpy's.
+        path: of the file, replaced if it exists.
     Raises:
         InvalidSettings: the file cannot be written, or a value has no plain form.
     """

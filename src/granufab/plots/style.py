@@ -167,6 +167,9 @@ def new_figure(
 def save(figure: Figure, stem: Path | str) -> tuple[Path, Path]:
     """Write ``stem.pdf`` (vectors, embedded TrueType fonts) and ``stem.png`` (300 dots per inch).
 
+    Args:
+        figure: to be written.
+        stem: path without the endings.
     Returns:
         The two files.
     Raises:

@@ -24,6 +24,7 @@ from granufab.reproduce.workers import Job, run_jobs
 __all__ = ["FIGURES", "QUICK_GRAINS", "reproduce"]
 
 FIGURES = tuple(f"fig{number}" for number in range(1, 9))
+"""Names that :func:`reproduce` knows, ``all`` apart."""
 QUICK_GRAINS = 1000
 
 

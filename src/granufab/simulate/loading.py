@@ -151,6 +151,12 @@ def ConstantMean(
     extension along ``axis``. True triaxial: ``b`` = (ε̇2 − ε̇3)/(ε̇1 − ε̇3), the extension ε̇3
     along the axis after ``axis``; b = 0 compression, 1/2 pure shear, 1 two equal contractions.
 
+    Args:
+        rate: ε̇_q [1/s].
+        pressure: mean stress that is held [Pa].
+        axis: of the contraction, from 0.
+        dimension: 2 or 3.
+        b: of the strain rate [-], in 3D.
     Raises:
         InvalidSettings: b in 2D or outside 0..1.
     """
@@ -178,7 +184,13 @@ def Biaxial(
 ) -> Loading:
     """Compression at ``axial_rate`` along ``axis`` with constant stress on the other axes.
 
-    Biaxial in 2D, triaxial in 3D. axial_rate [1/s], > 0 contracts.
+    Biaxial in 2D, triaxial in 3D.
+
+    Args:
+        axial_rate: > 0 contracts [1/s].
+        pressure: stress on the other axes [Pa].
+        axis: of the compression, from 0.
+        dimension: 2 or 3.
     """
     direction, extension = _axes(axis, dimension)
     gradient = np.zeros((dimension, dimension))
@@ -206,6 +218,13 @@ def SimpleShear(
     """Simple shear L_xy = ``rate`` with gradient along ``axis`` and flow along the axis before it.
 
     Normal stress σ_yy = ``pressure`` is held, or the volume (``constant_volume``).
+
+    Args:
+        rate: L_xy [1/s].
+        pressure: normal stress on the plane of shear [Pa].
+        axis: of the gradient, from 0.
+        constant_volume: hold the cell's height instead of the stress.
+        dimension: 2 or 3.
     """
     _axes(axis, dimension)
     flow = (axis - 1) % dimension

@@ -62,7 +62,12 @@ def local_form(problem: Problem, state: State, *, title: str = "") -> LocalProbl
 
 
 def local_state(problem: Problem, state: State) -> LocalState:
-    """The engine's own solution of a step, in the frames of :func:`local_form`."""
+    """The engine's own solution of a step, in the frames of :func:`local_form`.
+
+    Args:
+        problem: the step as the engine poses it.
+        state: what it ended with.
+    """
     impulse = _rows(problem, state.impulse_n, state.impulse_t)
     velocity = _rows(problem, problem.offset_n, problem.offset_t) + problem.softness * impulse
     for part in _maps(problem, state):
