@@ -100,8 +100,8 @@ def measure(
     for one, table in zip(opened, tables, strict=True):
         names = [name for name in SHOWN if name in table.variables]
         rows = [[state[name] for name in names] for state in _states(table)]
-        files, rule = listed(one.files, " + "), table.attrs["criterion"]
-        title = f"{files}; contacts: {rule}; fabric of: {z_definition}"
+        held, rule = listed(one.files, " + "), table.attrs["criterion"]
+        title = f"{held}; contacts: {rule}; fabric of: {z_definition}"
         print_rows(title, [SHOWN[name] for name in names], rows)
 
 
