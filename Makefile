@@ -1,7 +1,7 @@
 PYTHON ?= python
 BENCH_OUT ?= build/benchmarks
 
-.PHONY: check test slow bench peers docs format
+.PHONY: check test slow bench peers docs pictures format
 
 check:
 	$(PYTHON) -m ruff check src tests
@@ -23,6 +23,9 @@ peers:
 
 docs:
 	$(PYTHON) docs/write_api.py
+
+pictures:
+	$(PYTHON) docs/write_pictures.py
 
 format:
 	$(PYTHON) -m ruff format src tests

@@ -20,8 +20,7 @@ RENDERERS = ("webgl2", "canvas2d")
 
 
 def opened(look_at: Look, subject: Subject, renderer: str, more: str = "", frame: int = 7) -> Sight:
-    forced = "&renderer=canvas2d" if renderer == "canvas2d" else ""
-    sight = look_at(f"{subject.address}#frame={frame}{forced}{more}")
+    sight = look_at(f"{subject.address}#frame={frame}&renderer={renderer}{more}")
     sight.shown(f"0/{frame}/.*")
     sight.until(
         "() => document.querySelector('#packing').dataset.renderer",
