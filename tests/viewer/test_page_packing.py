@@ -77,23 +77,6 @@ def test_every_colour_and_every_line_is_another_picture(
                 assert share_changed(one, other) > 0.002, (values[place], values[k])
 
 
-@pytest.mark.parametrize("renderer", RENDERERS)
-def test_rattlers_take_their_share_of_the_area(
-    look_at: Look, disks: Subject, renderer: str
-) -> None:
-    """Pixels that change with the colour of rattlers are as many as their disks are large."""
-    sight = opened(look_at, disks, renderer, "&colour=none&lines=none")
-    plain = sight.pixels(CANVAS)
-    sight.page.select_option("#colour", "rattler")
-    sight.page.wait_for_timeout(200)
-    changed = float(np.sum(np.abs(plain - sight.pixels(CANVAS)).max(axis=-1) > 24))
-    header, arrays = frame_of(disks)
-    area = np.pi * arrays["radius"].astype(float) ** 2
-    rattlers = float(area[arrays["held"] == 0].sum())
-    linear, _ = plane(sight, header, arrays)
-    assert changed * abs(np.linalg.det(linear)) == pytest.approx(rattlers, rel=0.08)
-
-
 def pick(sight: Sight, x: float, y: float) -> str:
     """What the page says of the place of the canvas."""
     sight.page.locator(CANVAS).first.click(position={"x": x, "y": y})
