@@ -2,7 +2,7 @@ PYTHON ?= python
 BENCH_OUT ?= build/benchmarks
 SPHINX = $(PYTHON) -m sphinx -W --keep-going -q
 
-.PHONY: check test slow reliability bench peers pages docs pdf dist format
+.PHONY: check test slow reliability bench peers pages pictures docs pdf dist format
 
 check:
 	$(PYTHON) -m ruff check src tests docs benchmarks
@@ -40,6 +40,9 @@ pdf:
 
 dist:
 	$(PYTHON) -m build --outdir dist .
+
+pictures:
+	$(PYTHON) docs/write_pictures.py
 
 format:
 	$(PYTHON) -m ruff format src tests docs benchmarks

@@ -29,16 +29,16 @@ def saved(sight: Sight, panel: str, kind: str) -> tuple[str, bytes]:
 
 
 def ink(picture: Any) -> float:
-    """Share of the pixels that differ from the most common colour."""
-    colours, counts = np.unique(picture.reshape(-1, 3), axis=0, return_counts=True)
-    ground = colours[np.argmax(counts)]
-    return float(np.mean(np.abs(picture - ground).max(axis=-1) > 40))
+    """Share of the pixels that differ from the most common colour; one in nine is looked at."""
+    part = picture[::3, ::3].reshape(-1, 3).astype(int)
+    colours, counts = np.unique(part @ [65536, 256, 1], return_counts=True)
+    ground = colours[np.argmax(counts)] // [65536, 256, 1] % 256
+    return float(np.mean(np.abs(part - ground).max(axis=-1) > 40))
 
 
 def rendered(sight: Sight, svg: bytes) -> Any:
     """The pixels of an SVG file as a browser draws it by itself, without any network."""
     page = sight.page.context.new_page()
-    page.goto("about:blank")
     text = base64.b64encode(svg).decode()
     page.set_content(f'<img src="data:image/svg+xml;base64,{text}" style="width:800px">')
     page.wait_for_function("() => document.images[0].complete")

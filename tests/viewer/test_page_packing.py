@@ -20,8 +20,7 @@ RENDERERS = ("webgl2", "canvas2d")
 
 
 def opened(look_at: Look, subject: Subject, renderer: str, more: str = "", frame: int = 7) -> Sight:
-    forced = "&renderer=canvas2d" if renderer == "canvas2d" else ""
-    sight = look_at(f"{subject.address}#frame={frame}{forced}{more}")
+    sight = look_at(f"{subject.address}#frame={frame}&renderer={renderer}{more}")
     sight.shown(f"0/{frame}/.*")
     sight.until(
         "() => document.querySelector('#packing').dataset.renderer",
@@ -76,23 +75,6 @@ def test_every_colour_and_every_line_is_another_picture(
         for place, one in enumerate(seen):
             for k, other in enumerate(seen[:place]):
                 assert share_changed(one, other) > 0.002, (values[place], values[k])
-
-
-@pytest.mark.parametrize("renderer", RENDERERS)
-def test_rattlers_take_their_share_of_the_area(
-    look_at: Look, disks: Subject, renderer: str
-) -> None:
-    """Pixels that change with the colour of rattlers are as many as their disks are large."""
-    sight = opened(look_at, disks, renderer, "&colour=none&lines=none")
-    plain = sight.pixels(CANVAS)
-    sight.page.select_option("#colour", "rattler")
-    sight.page.wait_for_timeout(200)
-    changed = float(np.sum(np.abs(plain - sight.pixels(CANVAS)).max(axis=-1) > 24))
-    header, arrays = frame_of(disks)
-    area = np.pi * arrays["radius"].astype(float) ** 2
-    rattlers = float(area[arrays["held"] == 0].sum())
-    linear, _ = plane(sight, header, arrays)
-    assert changed * abs(np.linalg.det(linear)) == pytest.approx(rattlers, rel=0.08)
 
 
 def pick(sight: Sight, x: float, y: float) -> str:

@@ -1,7 +1,7 @@
 // The legend as drawn: a colour bar with its ends or a key of colours, and what the lines mean.
 
 export const HIGH = 44;
-const [LEFT, BAR, KEY] = [8, 150, 236];
+const [LEFT, BAR, KEY] = [8, 140, 168];
 const BOX = 10;
 
 // The inside of an SVG of height HIGH, colours of the theme written out.
@@ -34,7 +34,7 @@ export function lineKey(data, kind) {
   return {
     force: force ? [["force", 1.5, "fₙ = ⟨fₙ⟩, mean normal force"], ["force", 6, "fₙ = 4 ⟨fₙ⟩ and more"]] : [["force", 1, "contacts; no forces in these data"]],
     strong: force ? [["force", 4, "strong, fₙ > ⟨fₙ⟩"], ["weak", 1.5, "weak, fₙ ≤ ⟨fₙ⟩"]] : [["weak", 1, "contacts; no forces in these data"]],
-    changes: changes.missing ? [["soft", 1.5, `contacts; ${changes.missing}`]] : [["gain", 3, `gained: ${changes.gained}, since the frame before`], ["loss", 3, `lost: ${changes.lost}`], ["soft", 1.5, "there before and now"]],
+    changes: changes.missing ? [["soft", 1.5, `contacts; ${changes.missing}`]] : [["gain", 3, `gained: ${changes.gained}`], ["loss", 3, `lost: ${changes.lost}`], ["soft", 1.5, "kept since the frame before"]],
     normal: [["force", 1.5, "n, normals of the contacts"]],
     contact: [["force", 1.5, "contacts, from centre to centre"]],
   }[kind] || [];

@@ -53,18 +53,18 @@ function traces(rose) {
 }
 
 function layout(rose) {
-  const colours = theme();
+  const [colours, size] = [theme(), letters()];
   return {
-    margin: { l: 34, r: 34, t: 22, b: 22 },
+    margin: { l: 2.9 * size, r: 2.9 * size, t: 1.9 * size, b: 1.9 * size },
     polar: {
       bgcolor: "rgba(0,0,0,0)",
       radialaxis: {
         gridcolor: colours.line, linecolor: colours.soft, angle: 0, tickangle: 0, side: "clockwise", rangemode: "tozero", nticks: 4,
-        tickfont: { size: letters() - 1 },
+        tickfont: { size: size - 1 },
       },
       angularaxis: {
         gridcolor: colours.line, linecolor: colours.soft, rotation: rose.axis ? 90 : 0, direction: rose.axis ? "clockwise" : "counterclockwise",
-        tickfont: { size: letters() - 1 }, dtick: 45,
+        tickfont: { size: size - 1 }, dtick: 45,
       },
     },
   };
