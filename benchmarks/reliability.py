@@ -31,6 +31,7 @@ TESTS = (
     *("tests/io/test_damaged_run_file.py", "tests/io/test_declared_sizes.py"),
     *("tests/io/test_run_file_safety.py", "tests/io/test_run_lock.py"),
     *("tests/physics/test_invariants.py", "tests/physics/test_threads.py"),
+    "tests/viewer/test_server.py",
 )
 """Every test that the page names."""
 Entries = dict[str, dict[str, Any]]

@@ -187,6 +187,19 @@ def _campaign(c: Counts) -> str:
     )
 
 
+def _viewer(c: Counts) -> str:
+    file = "viewer/test_server.py::test_"
+    names = ("a_foreign_host_is_refused", "a_foreign_origin_is_refused")
+    foreign = c.passed(*(file + name for name in names))
+    outside = c.passed(file + "no_path_reaches_a_file")
+    tokens = c.passed(file + "without_the_token_nothing_is_given")
+    return (
+        f"{foreign} foreign Hosts and Origins: {foreign} × 403; {outside} paths out of the page's "
+        f"folder: {outside} × 404; {tokens} pairs of a path and a wrong token: 403 each, in the "
+        "address, the header and the cookie; other methods 405"
+    )
+
+
 def _seconds(c: Counts) -> str:
     (one,) = c.told("reliability/test_out_of_core.py::test_seconds_of_two_workers", "slow")
     gain = one["one"] / one["two"]
@@ -248,6 +261,7 @@ def cells(entries: Entries) -> dict[str, str]:
         "spheres": _memory(c, spheres, "10⁵ spheres"),
         "streams": _streams(c),
         "campaign": _campaign(c),
+        "viewer": _viewer(c),
         "seconds": _seconds(c),
     }
 

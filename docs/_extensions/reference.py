@@ -120,7 +120,16 @@ def _written(app: Sphinx) -> None:
     write_commands(Path(app.srcdir) / "reference" / "commands.md")
 
 
+def _of_another(
+    _app: Sphinx, _what: str, _name: str, member: Any, _skip: bool, _options: Any
+) -> bool | None:
+    """Leave out what a base class of another library adds to ours, such as ``Figure.set``."""
+    return True if (getattr(member, "__module__", None) or "").startswith("matplotlib.") else None
+
+
 def setup(app: Sphinx) -> dict[str, Any]:
     """Write the pages when a build begins."""
+    app.setup_extension("sphinx.ext.autodoc")
     app.connect("builder-inited", _written, priority=100)
+    app.connect("autodoc-skip-member", _of_another)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

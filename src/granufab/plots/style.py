@@ -107,10 +107,12 @@ class ColumnFigure(Figure):
     """A figure that keeps the house style whenever it is drawn or saved."""
 
     def draw(self, renderer: Any) -> None:
+        """As of any figure, in the house style."""
         with style():
             super().draw(renderer)
 
     def savefig(self, *args: Any, **kwargs: Any) -> None:
+        """As of any figure, in the house style."""
         with style():
             super().savefig(*args, **kwargs)
 
