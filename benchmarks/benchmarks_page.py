@@ -99,6 +99,25 @@ def growth(rows: list[Result]) -> str:
     return "Sweeps grow as Nˣ, x at residual " + "; ".join(words) + "." if words else ""
 
 
+def copies(rows: list[Result]) -> str:
+    """Sweeps on one sample, and on copies of a part of it."""
+    header = ("disks", "sheared as", "steps", "residual", "sweeps plain", "accelerated", "ratio")
+    return table(
+        header,
+        (
+            [
+                r["grains"],
+                "one sample" if r["source"] >= r["grains"] else f"copies of {r['source']}",
+                r["steps"],
+                f"{r['tolerance']:.0e}",
+                *(f"{r[kind]['sweeps_mean']:.0f}" for kind in ("plain", "accelerated")),
+                r["sweeps_ratio"],
+            ]
+            for r in rows
+        ),
+    )
+
+
 def step(rows: list[Result]) -> str:
     """Where a step's time goes."""
     stages = list(rows[0]["ms_by_stage"])
@@ -158,6 +177,7 @@ def tables(data: Result) -> dict[str, str]:
     """The text between each pair of the page's markers, for the parts that were measured."""
     makers = {
         "kernels": kernels, "threads": threads, "problems": solvers, "consecutive": solvers,
+        "copies": copies,
         "step": step, "curve": curve, "memory": memory, "start": start, "figures": figures,
     }  # fmt: skip
     found = {name: make(data[name]) for name, make in makers.items() if name in data}

@@ -4,9 +4,10 @@
     python benchmarks/pages.py benchmarks OUT
 
 Parts: kernels, threads, problems (one step from a warm and from a cold start), consecutive (steps
-from ε_q = 0.2), step (profile), curve (cost per contact update), start, memory, figures. Each
-part's result is kept in OUT/benchmarks.json and not measured again unless it is named; the states
-lie in OUT/states and serve the next version of the engine too.
+from ε_q = 0.2), copies (one sample beside copies of a part), step (profile), curve (cost per
+contact update), start, memory, figures. Each part's result is kept in OUT/benchmarks.json and not
+measured again unless it is named; the states lie in OUT/states and serve the next version of the
+engine too.
 """
 
 from __future__ import annotations
@@ -154,6 +155,19 @@ def consecutive(bench: Bench) -> list[dict[str, Any]]:
     return rows
 
 
+def copies(bench: Bench) -> list[dict[str, Any]]:
+    """The same number of disks sheared as one sample, and as copies of a quarter of it."""
+    rows = []
+    for source in (1200, 300):
+        packing = _sheared(1200, source=source)
+        row = compare_solvers(
+            packing, biaxial_loading(packing),
+            friction=FRICTION, tolerance=1e-5, steps=20, cap=PLAIN_CAP,
+        )  # fmt: skip
+        rows.append({"source": source, **row})
+    return rows
+
+
 def step(bench: Bench) -> list[dict[str, Any]]:
     """Where the time of a step goes."""
     rows = []
@@ -195,7 +209,18 @@ def figures(bench: Bench) -> list[dict[str, Any]]:
 
 PARTS: dict[str, Callable[[Bench], Any]] = {
     part.__name__: part
-    for part in (kernels, threads, start, curve, memory, step, problems, consecutive, figures)
+    for part in (
+        kernels,
+        threads,
+        start,
+        curve,
+        memory,
+        step,
+        problems,
+        consecutive,
+        copies,
+        figures,
+    )
 }
 
 

@@ -30,6 +30,7 @@ CLAIMED: dict[tuple[str, str], str] = {
     ("docs/formats.md", "python"): f"{TESTS}/test_formats_page.py",
     ("docs/formats.md", "toml"): f"{TESTS}/test_formats_page.py",
     ("docs/formats.md", "pycon"): f"{TESTS}/test_formats_page.py",
+    ("docs/concepts.md", "console"): f"{TESTS}/test_questions_page.py",
     ("docs/campaigns.md", "python"): f"{TESTS}/test_campaigns_page.py",
     ("docs/campaigns.md", "toml"): f"{TESTS}/test_campaigns_page.py",
     ("docs/campaigns.md", "sh"): f"{TESTS}/test_campaigns_page.py",
