@@ -13,7 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from granufab.errors import CorruptFile
-from granufab.kernels.step_arrays import MADE, TOTAL, TOTAL_GOAL, WALK_GOAL, WALKED
+from granufab.kernels.step_arrays import MADE, STATUS, TOTAL, TOTAL_GOAL, WALK_GOAL, WALKED
 from granufab.simulate.stepping import Simulation
 
 __all__ = ["restore", "snapshot"]
@@ -22,8 +22,8 @@ _CANDIDATES = (
     "pairs", "images", "normal", "length", "gap", "active", "impulse_n", "impulse_t", "memory_t",
     "friction", "home",
 )  # fmt: skip
-_OF_A_CALL = (MADE, WALKED, WALK_GOAL, TOTAL, TOTAL_GOAL)
-"""Places in the control that count within one call of the kernel: how many steps that has is a
+_OF_A_CALL = (STATUS, MADE, WALKED, WALK_GOAL, TOTAL, TOTAL_GOAL)
+"""Places in the control that tell of one call of the kernel: how many steps that has is a
 matter of time, not of the state."""
 _NUMBERS = ("time", "step_size", "damping", "contact_updates", "searches")
 
