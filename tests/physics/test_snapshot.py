@@ -96,3 +96,11 @@ def test_a_snapshot_of_another_sample_is_refused_and_changes_nothing() -> None:
         restore(CASES["disks"](), {**held, "pair_gap": held["pair_gap"][:-1]})
     after = snapshot(other)
     assert all(np.array_equal(after[name], before[name], equal_nan=True) for name in after)
+
+
+def test_a_snapshot_does_not_tell_in_how_many_calls_the_steps_were_made() -> None:
+    together, apart = CASES["sheared"](), CASES["sheared"]()
+    go(together, 12)
+    for _ in range(12):
+        apart.advance(1)
+    assert same(together, apart)

@@ -124,7 +124,7 @@ def test_arrow_keys_move_the_handles(look_at: Look, disks: Subject) -> None:
             follows(sight, disks, *now, az=False)
 
         sight.eventually(check)
-    assert sight.now().startswith("0/6/")  # the keys belong to the handle
+        assert sight.stays().startswith("0/6/")  # the keys belong to the handle
     again = look_at(disks.address + sight.ask("() => location.hash"))
     again.shown("0/6/.*")
     assert limits(again) == pytest.approx(limits(sight), abs=1e-9)

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from granufab.errors import CorruptFile
+from granufab.kernels.step_arrays import MADE, STATUS, TOTAL, TOTAL_GOAL, WALK_GOAL, WALKED
 from granufab.simulate.stepping import Simulation
 
 __all__ = ["restore", "snapshot"]
@@ -21,6 +22,9 @@ _CANDIDATES = (
     "pairs", "images", "normal", "length", "gap", "active", "impulse_n", "impulse_t", "memory_t",
     "friction", "home",
 )  # fmt: skip
+_OF_A_CALL = (STATUS, MADE, WALKED, WALK_GOAL, TOTAL, TOTAL_GOAL)
+"""Places in the control that tell of one call of the kernel: how many steps that has is a
+matter of time, not of the state."""
 _NUMBERS = ("time", "step_size", "damping", "contact_updates", "searches")
 
 
@@ -47,6 +51,7 @@ def _fixed(simulation: Simulation) -> dict[str, np.ndarray]:
 def snapshot(simulation: Simulation) -> dict[str, np.ndarray]:
     """The state of a system between two steps; arrays are copies."""
     held = {name: value.copy() for name, value in _fixed(simulation).items()}
+    held["control"][list(_OF_A_CALL)] = 0.0
     held |= {f"pair_{n}": getattr(simulation.candidates, n).copy() for n in _CANDIDATES}
     cap = np.inf if simulation.rate_cap is None else simulation.rate_cap
     numbers = [float(getattr(simulation, name)) for name in _NUMBERS]
