@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 import re
+import shlex
+import subprocess
 import sys
 import warnings
 from pathlib import Path
@@ -16,31 +18,56 @@ from notebook_cells import TUTORIALS, cells, run_cells
 
 PAGES = sorted(page for page in TUTORIALS.glob("*.md") if page.stem != "index")
 LONG = {"friction-campaign", "fit-and-predict"}
+QUICK = [page for page in PAGES if page.stem not in LONG]
 by_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 
 
-@pytest.mark.parametrize(
-    "page",
-    [
-        pytest.param(page, marks=[pytest.mark.slow] if page.stem in LONG else [], id=page.stem)
-        for page in PAGES
-    ],
-)
+def _run(page: Path) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # a page shows no warnings
+        run_cells(page)
+
+
+@pytest.mark.parametrize("page", QUICK, ids=lambda page: page.stem)
 def test_all_cells_run_in_order(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")  # a page shows no warnings
-        names = run_cells(page)
-    assert names["gf" if page.stem != "friction-campaign" else "results"] is not None
+    _run(page)
+
+
+@pytest.mark.slow
+def test_the_prediction_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    _run(TUTORIALS / "fit-and-predict.md")
+
+
+@pytest.mark.slow
+def test_the_campaign_and_its_shell_commands_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = TUTORIALS / "friction-campaign.md"
+    _run(page)
+    runs = {file: file.stat().st_mtime_ns for file in tmp_path.glob("friction/cases/*/run.h5")}
+    (lines,) = re.findall(r"^```sh\n(.*?)^```$", page.read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    for line in lines.splitlines():
+        words = shlex.split(line)
+        assert words[0] == "granufab"
+        command = [sys.executable, "-c", "from granufab.cli import main; main()", *words[1:]]
+        subprocess.run(command, check=True, timeout=300)
+    assert (tmp_path / "friction.png").stat().st_size > 10_000
+    assert len(runs) == 6
+    assert {file: file.stat().st_mtime_ns for file in runs} == runs  # nothing ran again
 
 
 @by_page
-def test_numbers_are_asserted_and_magics_are_not_used(page: Path) -> None:
+def test_cells_assert_numbers_are_plain_python_and_fit_the_page(page: Path) -> None:
     found = [node for code in cells(page) for node in ast.walk(ast.parse(code))]
     checks = [node for node in found if isinstance(node, ast.Assert)]
     assert len(checks) >= 2
+    widest = max(len(line) for code in cells(page) for line in code.splitlines())
+    assert widest <= 93  # what a page shows without scrolling
     for check in checks:  # each looks at something that was computed
         assert any(isinstance(node, ast.Name) for node in ast.walk(check.test))
 
