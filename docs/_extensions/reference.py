@@ -102,7 +102,8 @@ def _table(kind: str, parameters: list[Any]) -> list[str]:
         unsaid = one.default in (None, False, (), []) or callable(one.default)
         default = "" if unsaid else f"`{one.default}`"
         text = _plain(getattr(one, "help", "") or "").replace("\n", " ").replace("|", "\\|")
-        rows.append(f"| {', '.join(f'`{name}`' for name in names)} | {default} | {text} |")
+        shown_names = ", ".join(f"`{name}`" for name in names).replace("|", "\\|")
+        rows.append(f"| {shown_names} | {default} | {text} |")
     return [*rows, ""]
 
 
