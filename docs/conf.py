@@ -1,10 +1,12 @@
 """Settings of the documentation: built by ``make docs``, with warnings as errors."""
 
+import logging
 import sys
 from importlib import metadata
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
+logging.getLogger("fontTools").setLevel(logging.WARNING)  # else it tells of every glyph
 
 project = "granufab"
 author = "The granufab authors"
@@ -18,9 +20,10 @@ extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
+    "sphinx_gallery.gen_gallery",
 ]
 html_math_renderer = "mathml"
-exclude_patterns = ["_extensions", "**/README.md"]
+exclude_patterns = ["_extensions", "**/README.md", "**/GALLERY_HEADER.rst"]
 source_suffix = {".md": "myst-nb", ".rst": "restructuredtext", ".ipynb": "myst-nb"}
 
 myst_enable_extensions = ["dollarmath", "attrs_inline"]
@@ -36,6 +39,22 @@ autodoc_member_order = "bysource"
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
+
+_families = ("figures", "sources", "loadings")
+sphinx_gallery_conf = {
+    "examples_dirs": [f"gallery/{name}" for name in _families],
+    "gallery_dirs": [f"gallery/generated/{name}" for name in _families],
+    "filename_pattern": r"\.py$",
+    "ignore_pattern": r"shared_\w+\.py$",
+    "within_subsection_order": "FileNameSortKey",
+    "image_scrapers": "gallery_figures.collect",
+    "capture_repr": (),
+    "notebook_extensions": set(),
+    "download_all_examples": False,
+    "write_computation_times": False,
+    "show_signature": False,
+    "abort_on_example_error": False,
+}
 
 html_theme = "furo"
 html_title = f"granufab {release}"
