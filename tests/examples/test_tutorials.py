@@ -17,8 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from notebook_cells import TUTORIALS, cells, run_cells
 
 PAGES = sorted(page for page in TUTORIALS.glob("*.md") if page.stem != "index")
-LONG = {"friction-campaign", "fit-and-predict"}
-QUICK = [page for page in PAGES if page.stem not in LONG]
+QUICK = [page for page in PAGES if page.stem != "friction-campaign"]
 by_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 
 
@@ -34,12 +33,6 @@ def test_all_cells_run_in_order(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     _run(page)
-
-
-@pytest.mark.slow
-def test_the_prediction_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    _run(TUTORIALS / "fit-and-predict.md")
 
 
 @pytest.mark.slow
