@@ -17,8 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from notebook_cells import TUTORIALS, cells, run_cells
 
 PAGES = sorted(page for page in TUTORIALS.glob("*.md") if page.stem != "index")
-LONG = {"friction-campaign", "fit-and-predict"}
-QUICK = [page for page in PAGES if page.stem not in LONG]
+QUICK = [page for page in PAGES if page.stem != "friction-campaign"]
 by_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 
 
@@ -34,12 +33,6 @@ def test_all_cells_run_in_order(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     _run(page)
-
-
-@pytest.mark.slow
-def test_the_prediction_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    _run(TUTORIALS / "fit-and-predict.md")
 
 
 @pytest.mark.slow
@@ -67,7 +60,7 @@ def test_cells_assert_numbers_are_plain_python_and_fit_the_page(page: Path) -> N
     checks = [node for node in found if isinstance(node, ast.Assert)]
     assert len(checks) >= 2
     widest = max(len(line) for code in cells(page) for line in code.splitlines())
-    assert widest <= 93  # what a page shows without scrolling
+    assert widest <= 90  # what a page shows without scrolling
     for check in checks:  # each looks at something that was computed
         assert any(isinstance(node, ast.Name) for node in ast.walk(check.test))
 
