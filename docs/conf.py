@@ -34,7 +34,6 @@ nb_execution_in_temp = True
 nb_execution_raise_on_error = True
 
 autodoc_typehints = "signature"
-autodoc_type_aliases = {"Array": "Array", "IntArray": "IntArray", "ArrayLike": "ArrayLike"}
 autodoc_member_order = "bysource"
 napoleon_google_docstring = True
 napoleon_numpy_docstring = False
