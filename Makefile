@@ -14,7 +14,7 @@ test:
 	$(PYTHON) -m pytest
 
 slow:
-	$(PYTHON) -m pytest -m slow
+	$(PYTHON) -m pytest -m slow -n 0
 
 reliability:
 	$(PYTHON) benchmarks/reliability.py
