@@ -6,7 +6,7 @@ from importlib import metadata
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent / "_extensions"))
-logging.getLogger("fontTools").setLevel(logging.WARNING)  # else it tells of every glyph
+logging.basicConfig(level=logging.WARNING)  # or furo's styles make every library chatter
 
 project = "granufab"
 author = "The granufab authors"

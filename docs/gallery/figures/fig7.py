@@ -19,8 +19,8 @@ dense, loose = numbers["paths"]
 for path in (dense, loose):
     z, a = path["z_star"]["value"], path["a_star"]["value"]
     print(f"{path['name']}: z_0 {path['z_0']:.2f} -> z* {z:.3f}, a* {a:.3f}")
-fit = {name: value["value"] for name, value in numbers["fit"]["default"].items() if name in (
-    "z_star", "a_star", "z_min", "z_max")}  # fmt: skip
+names = ("z_star", "a_star", "z_min", "z_max")
+fit = {name: numbers["fit"]["default"][name]["value"] for name in names}
 assert dense["z_0"] > fit["z_star"] + 0.2 > loose["z_0"] + 0.2
 assert abs(dense["z_star"]["value"] - loose["z_star"]["value"]) < 0.12
 assert abs(dense["a_star"]["value"] - loose["a_star"]["value"]) < 0.15

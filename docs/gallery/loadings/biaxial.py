@@ -43,10 +43,11 @@ assert phi[0] / phi[-1] - 1 > 0.005
 # Both stresses against strain, and the solid fraction.
 
 figure, (above, below) = plots.new_figure(rows=2, height=4.2)
-above.plot(strain[1:], axial, "o-", color=COLOURS[1], label=r"$\sigma_{yy}$, axial")
-above.plot(strain[1:], lateral, "o-", color=COLOURS[0], label=r"$\sigma_{xx}$, lateral")
-above.set_ylabel("stress [p]")
-above.legend()
-below.plot(run.series["eps_q"], phi, color=COLOURS[2])
-below.set_ylabel(r"solid fraction $\phi$ [-]")
-below.set_xlabel(r"$\varepsilon_q$ [-]")
+with plots.style():
+    above.plot(strain[1:], axial, "o-", color=COLOURS[1], label=r"$\sigma_{yy}$, axial")
+    above.plot(strain[1:], lateral, "o-", color=COLOURS[0], label=r"$\sigma_{xx}$, lateral")
+    above.set_ylabel("stress [p]")
+    above.legend(loc="center right")
+    below.plot(run.series["eps_q"], phi, color=COLOURS[2])
+    below.set_ylabel(r"solid fraction $\phi$ [-]")
+    below.set_xlabel(r"$\varepsilon_q$ [-]")

@@ -41,8 +41,9 @@ assert loose < 0.5
 # The pressure against strain.
 
 figure, (panel,) = plots.new_figure()
-for label, run in runs.items():
-    panel.semilogy(run.series["eps_q"], np.maximum(run.series["p"], 1e-4), label=label)
-panel.set_xlabel(r"shear strain $\gamma$ [-]")
-panel.set_ylabel("mean stress [p]")
-panel.legend()
+with plots.style():
+    for label, run in runs.items():
+        panel.semilogy(run.series["eps_q"], np.maximum(run.series["p"], 1e-4), label=label)
+    panel.set_xlabel(r"shear strain $\gamma$ [-]")
+    panel.set_ylabel("mean stress [p]")
+    panel.legend()

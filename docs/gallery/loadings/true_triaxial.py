@@ -49,8 +49,10 @@ assert mean[1] > mean[0] + 0.05 > mean[2] + 0.1
 # The three stresses against strain.
 
 figure, (panel,) = plots.new_figure()
-for axis, label, colour in ((1, "y, contracts", 1), (0, "x, between", 2), (2, "z, extends", 0)):
-    panel.plot(strain[1:], stress[1:, axis], "o-", color=COLOURS[colour], label=label)
-panel.set_xlabel(r"$\varepsilon_q$ [-]")
-panel.set_ylabel("stress [p]")
-panel.legend()
+with plots.style():
+    for axis, label, colour in ((1, "y, contracts", 1), (0, "x, between", 2), (2, "z, extends", 0)):
+        panel.plot(strain[1:], stress[1:, axis], "o-", color=COLOURS[colour], label=label)
+    panel.set_xlabel(r"$\varepsilon_q$ [-]")
+    panel.set_ylabel("stress [p]")
+    panel.set_ylim(0.4, 2.2)
+    panel.legend()

@@ -16,7 +16,7 @@ from shared_packing import box, compared, counted, disks, lines
 import granufab as gf
 from granufab import plots
 
-packing = disks()
+packing = disks(seed=1)
 
 # %%
 # Write two tables with names of our own, the forces on the first grain, and read them with a map.

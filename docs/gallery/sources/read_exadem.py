@@ -23,7 +23,7 @@ from shared_packing import (
 import granufab as gf
 from granufab import plots
 
-packing = spheres()
+packing = spheres(seed=2)
 
 # %%
 # Write both files of step 20 and read them together.
@@ -56,6 +56,8 @@ found = gf.measure(state, z_definition="z")
 assert compared(found, counted(packing)) < 1e-8
 
 # %%
-# The contacts that were read, as lines as wide as their normal force; what is farther is paler.
+# Contacts per grain and direction, around the axis of compression, with the second-order fit.
 
-figure = plots.network_3d(state).figure
+network = gf.fabric.select_network(state)
+along = gf.orientation(network.contacts, z=network.z, bins=8, axis=np.array([0.0, 1.0, 0.0]))
+figure = plots.rose(along).figure

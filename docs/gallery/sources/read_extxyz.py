@@ -16,7 +16,7 @@ import granufab as gf
 from granufab import plots
 from granufab.io import write
 
-packing = spheres()
+packing = spheres(seed=3)
 
 # %%
 # Write the packing, look at the first lines, read it.
@@ -34,6 +34,7 @@ found = gf.measure(state, criterion="gap:0.001", z_definition="z")
 assert compared(found, counted_by_gap(packing, 0.001)) < 1e-8
 
 # %%
-# The contacts that were found; lines are of one width, since there are no forces.
+# How z and a of this state depend on δ.
 
-figure = plots.network_3d(state, criterion="gap:0.001").figure
+curves = gf.fabric.criterion_curves(state)
+figure = plots.criterion_curves(curves)[0].figure

@@ -18,7 +18,7 @@ from shared_packing import compared, counted_by_gap, edges, spheres
 import granufab as gf
 from granufab import plots
 
-packing = spheres()
+packing = spheres(seed=4)
 
 # %%
 # Write header, names, arrays and index by hand, and read them.

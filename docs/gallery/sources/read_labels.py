@@ -23,7 +23,7 @@ from granufab import plots
 # Draw the spheres of a small packing at 16 voxels a mean diameter, cut at the edge of the image
 # as a scan is, and read the image.
 
-packing = spheres()
+packing = spheres(seed=5)
 voxels = 16 / (2 * packing.grains.radius.mean())
 centre, radius = packing.grains.position * voxels, packing.grains.radius * voxels
 size = np.ceil(np.diag(packing.cell.matrix) * voxels).astype(int)

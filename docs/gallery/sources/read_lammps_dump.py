@@ -17,7 +17,7 @@ from shared_packing import compared, counted, edges, lines, parts, spheres
 import granufab as gf
 from granufab import plots
 
-packing = spheres()
+packing = spheres(seed=7)
 
 # %%
 # Write both files, read them together, and print what was recognised.

@@ -16,7 +16,7 @@ from shared_packing import compared, counted, edges, lines, points, spheres
 import granufab as gf
 from granufab import plots
 
-packing = spheres()
+packing = spheres(seed=8)
 
 # %%
 # Write both files and read them with the words of the compute. After the two ids comes a mark of

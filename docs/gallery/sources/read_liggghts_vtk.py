@@ -16,7 +16,7 @@ from shared_packing import box, compared, counted, lines, spheres
 import granufab as gf
 from granufab import plots
 
-packing = spheres()
+packing = spheres(seed=9)
 
 # %%
 # Write points and lines, read them with the cell.

@@ -18,7 +18,7 @@ from shared_packing import box, compared, counted, disks
 import granufab as gf
 from granufab import plots
 
-packing = disks()
+packing = disks(seed=10)
 
 # %%
 # Write the three files, read their folder, and look at the record of one contact.

@@ -24,7 +24,7 @@ from shared_packing import (
 import granufab as gf
 from granufab import plots
 
-packing = spheres()
+packing = spheres(seed=12)
 
 # %%
 # Write both files, read them together, and print what was said of them.
@@ -58,6 +58,6 @@ found = gf.measure(state, z_definition="z")
 assert compared(found, counted(packing)) < 1e-8
 
 # %%
-# The contacts that were read, as lines as wide as their normal force; what is farther is paler.
+# The density of the normal forces that were read.
 
-figure = plots.network_3d(state).figure
+figure = plots.force_density(gf.fabric.force_statistics(state)).figure

@@ -15,7 +15,7 @@ from shared_packing import compared, counted, edges, lines, points, spheres
 import granufab as gf
 from granufab import plots
 
-packing = spheres()
+packing = spheres(seed=13)
 
 # %%
 # Write the file, read it, and look at its head.

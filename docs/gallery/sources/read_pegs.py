@@ -17,7 +17,7 @@ from shared_packing import box, compared, counted, disks, lines, parts
 import granufab as gf
 from granufab import plots
 
-packing = disks()
+packing = disks(seed=14)
 
 # %%
 # Write both files and read the folder. An experiment has walls; the cell is given here because

@@ -24,7 +24,7 @@ from shared_packing import (
 import granufab as gf
 from granufab import plots
 
-packing = spheres()
+packing = spheres(seed=16)
 
 # %%
 # Write the shape and the conf, read the conf.

@@ -25,7 +25,7 @@ from shared_packing import (
 import granufab as gf
 from granufab import plots
 
-packing = spheres()
+packing = spheres(seed=17)
 
 # %%
 # Write both files, read them together, and look at the contacts.

@@ -17,7 +17,7 @@ import granufab as gf
 from granufab import plots
 from granufab.io import write
 
-packing = spheres()
+packing = spheres(seed=18)
 
 # %%
 # Write the packing, list what the file holds, read it.

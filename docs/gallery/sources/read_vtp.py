@@ -16,7 +16,7 @@ import granufab as gf
 from granufab import plots
 from granufab.io import write
 
-packing = spheres()
+packing = spheres(seed=19)
 
 # %%
 # Write the pair, read it.
@@ -35,6 +35,7 @@ found = gf.measure(state, z_definition="z")
 assert compared(found, counted(packing)) < 1e-12
 
 # %%
-# The contacts that were read, as lines as wide as their normal force; what is farther is paler.
+# The density of the normal forces, on an axis where an exponential is straight.
 
-figure = plots.network_3d(state).figure
+forces = gf.fabric.force_statistics(state)
+figure = plots.force_density(forces, logarithmic_force=False).figure

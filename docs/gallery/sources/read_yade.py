@@ -26,7 +26,7 @@ import granufab as gf
 from granufab import plots
 from granufab.io import write
 
-packing = spheres()
+packing = spheres(seed=20)
 
 # %%
 # Write both, look at the first lines, and read the spheres alone and then both.

@@ -23,24 +23,24 @@ __all__ = [
 ]  # fmt: skip
 
 
-def disks() -> Packing:
+def disks(seed: int = 1) -> Packing:
     """200 disks, compressed and then sheared by 3 %."""
-    return _sheared(2, 200)
+    return _sheared(2, 200, seed)
 
 
-def spheres() -> Packing:
+def spheres(seed: int = 1) -> Packing:
     """150 spheres, compressed and then sheared by 3 %."""
-    return _sheared(3, 150)
+    return _sheared(3, 150, seed)
 
 
 @cache
-def _sheared(dimension: Any, count: int) -> Packing:
+def _sheared(dimension: Any, count: int, seed: int) -> Packing:
     """The last state, its grains within the periodic cell, with the contacts that bear.
 
     Branches and normals are those of the positions: a run keeps those of the middle of its step.
     """
     solver = Solver(tolerance=1e-3)
-    sample = gf.prepare(Sample(grain_count=count, dimension=dimension, friction=0.1))
+    sample = gf.prepare(Sample(grain_count=count, dimension=dimension, friction=0.1, seed=seed))
     run = gf.shear(sample.packing, strain=0.03, inertial_number=5e-3, solver=solver)
     state = run.frames[-1].packing
     position = np.mod(state.grains.position - state.cell.origin, edges(state))
