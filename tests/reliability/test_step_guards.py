@@ -115,7 +115,8 @@ def test_a_fault_in_the_middle_of_a_call_ends_it_there(
     simulation = Simulation(apart, still, step=0.01, damping=-9.0)
     assert simulation.contact_solver.threads == threads
     with pytest.raises(BrokenState, match=f"the spin of grain {NUMBER} is not finite"):
-        simulation.advance(50)
+        for _ in range(steps + 2):  # a call may return after some tenths of a second
+            simulation.advance(50)
     assert simulation.time == pytest.approx((steps + 1) * 0.01, rel=1e-9)
 
 
