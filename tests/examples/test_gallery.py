@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import ast
 import runpy
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any, get_args
 
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from page_blocks import ROOT, blocks
 
 from granufab.io import formats
 from granufab.io.readers import foreign_formats
 from granufab.reproduce import FIGURES
 from granufab.simulate.settings import Stage
 
-GALLERY = Path(__file__).resolve().parents[2] / "docs" / "gallery"
+GALLERY = ROOT / "docs" / "gallery"
 SCRIPTS = {
     path.relative_to(GALLERY).as_posix(): path
     for family in ("figures", "sources", "loadings")
@@ -93,3 +100,16 @@ def test_every_loading_has_a_script() -> None:
     loadings: Any = get_args(Stage.model_fields["loading"].annotation)
     named = {loading.replace("-", "_") for loading in loadings}
     assert _names("loadings") == named | {"true_triaxial", "reversal"}
+
+
+def test_the_command_of_the_page_runs_a_script_by_itself() -> None:
+    """Those of gallery/index.md, from the root of the project."""
+    commands = [b.text.strip() for b in blocks(GALLERY / "index.md") if b.language == "sh"]
+    assert len(commands) == 1
+    python, *words = shlex.split(commands[0])
+    assert python == "python"
+    done = subprocess.run(
+        [sys.executable, *words], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "lateral" in done.stdout
