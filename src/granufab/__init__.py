@@ -66,7 +66,9 @@ _HOME = {
     "view": "viewer.notebook",
     "GranufabError": "errors",
 }
-_SUBPACKAGES = ("fabric", "states", "plots", "reproduce")
+_SUBPACKAGES = (
+    "fabric", "states", "plots", "reproduce", "io", "simulate", "campaign", "viewer"
+)  # fmt: skip
 
 __all__ = [
     "AccessibleDomain",

@@ -41,6 +41,13 @@ def test_each_public_name_loads(name: str) -> None:
     assert getattr(granufab, name) is not None
 
 
+@pytest.mark.parametrize("name", ["io", "simulate", "campaign", "viewer"])
+def test_a_subpackage_loads_after_the_package_alone(name: str) -> None:
+    code = f"import granufab; print(granufab.{name}.__name__)"
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert told.stdout.split() == [f"granufab.{name}"]
+
+
 def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = granufab.nothing
