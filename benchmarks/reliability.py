@@ -43,7 +43,16 @@ def run(speed: str, tests: tuple[str, ...]) -> Entries:
     Raises:
         SystemExit: a test failed; nothing is stored.
     """
-    command = ["-m", "pytest", "-q", "-n", "0", "-m", "slow" if speed == "slow" else "not slow", *tests]
+    command = [
+        "-m",
+        "pytest",
+        "-q",
+        "-n",
+        "0",
+        "-m",
+        "slow" if speed == "slow" else "not slow",
+        *tests,
+    ]
     with tempfile.TemporaryDirectory() as folder:
         told, report = Path(folder) / "told.jsonl", Path(folder) / "report.xml"
         done = subprocess.run(
