@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from granufab.errors import InvalidPacking, InvalidSettings
 from granufab.fabric.coordination import ZDefinition, coordination, counted_contacts
 from granufab.fabric.criterion import Criterion, select_contacts, wall_support
-from granufab.fabric.neighbours import branch_vectors
+from granufab.fabric.neighbours import branch_images, branch_vectors
 from granufab.fabric.row_labels import row_labels
 from granufab.packing import Array, Contacts, IntArray, Packing
 
@@ -189,14 +189,9 @@ def _check_once(packing: Packing, contacts: Contacts, key: IntArray) -> None:
 def _images(packing: Packing, contacts: Contacts) -> IntArray:
     if contacts.image is not None:
         return contacts.image
-    if packing.cell is None:
-        return np.zeros((contacts.count, packing.dimension), dtype=np.int64)
-    i, j = contacts.pair.T
-    position = packing.grains.position
     listed = Packing(grains=packing.grains, contacts=contacts, cell=packing.cell)
-    shift = branch_vectors(listed) - (position[j] - position[i])
-    fraction = np.linalg.solve(packing.cell.matrix, shift.T).T
-    return np.rint(fraction * np.array(packing.cell.periodic)).astype(np.int64)
+    branch = branch_vectors(listed)
+    return branch_images(branch, contacts.pair, packing.grains.position, packing.cell)
 
 
 def _turned(numbers: IntArray, image: IntArray) -> NDArray[np.bool_]:

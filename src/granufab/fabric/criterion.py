@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from granufab.errors import InvalidSettings
 from granufab.fabric.neighbours import neighbours_within, walls_within
@@ -14,6 +15,7 @@ from granufab.packing import Array, Contacts, IntArray, Packing, require
 __all__ = [
     "FORCE_FRACTION",
     "Criterion",
+    "counted_pairs",
     "force_threshold",
     "mean_diameter",
     "normal_force",
@@ -125,15 +127,32 @@ def select_contacts(
     rule = parse_criterion(criterion)
     contacts = packing.contacts
     if rule.kind == "gap":
-        widest = rule.gap * mean_diameter(packing)
+        diameter = mean_diameter(packing)
         if contacts is not None and contacts.gap is not None and _complete(rule, reach):
-            return contacts.select(contacts.gap < widest)
-        return neighbours_within(packing, widest)
+            return contacts.select(counted_pairs(contacts, rule, diameter))
+        return neighbours_within(packing, rule.gap * diameter)
     contacts = require(contacts, "contacts", "use the criterion gap:DELTA")
     if rule.kind == "listed":
         return contacts
+    return contacts.select(counted_pairs(contacts, rule, mean_diameter(packing)))
+
+
+def counted_pairs(contacts: Contacts, criterion: Criterion, diameter: float) -> NDArray[np.bool_]:
+    """Which pairs of a list count as contacts, shape (contact_count,).
+
+    Args:
+        contacts: the list; for ``gap`` it holds every pair up to that gap.
+        criterion: the rule.
+        diameter: mean diameter of the grains [m], in which gaps are given.
+    Raises:
+        MissingData: the list lacks the forces or gaps that the criterion needs.
+    """
+    if criterion.kind == "listed":
+        return np.ones(contacts.count, dtype=bool)
+    if criterion.kind == "gap":
+        return require(contacts.gap, "gaps", "use the criterion force") < criterion.gap * diameter
     force = normal_force(contacts)
-    return contacts.select(np.abs(force) > force_threshold(force, rule.share))
+    return np.abs(force) > force_threshold(force, criterion.share)
 
 
 def wall_support(

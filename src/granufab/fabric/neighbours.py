@@ -10,7 +10,14 @@ import scipy  # its parts load where they are used
 from granufab.errors import InvalidPacking
 from granufab.packing import Array, Cell, Contacts, IntArray, Packing
 
-__all__ = ["branch_vectors", "cell_fractions", "neighbours_within", "walls_within", "wrap"]
+__all__ = [
+    "branch_images",
+    "branch_vectors",
+    "cell_fractions",
+    "neighbours_within",
+    "walls_within",
+    "wrap",
+]
 
 
 def neighbours_within(packing: Packing, gap: float) -> Contacts:
@@ -110,6 +117,24 @@ def cell_fractions(position: Array, cell: Cell) -> Array:
     """Coordinates along the lattice vectors, 0..1 inside the cell [-], shape (grain_count, D)."""
     origin = 0.0 if cell.origin is None else cell.origin
     return np.asarray(np.linalg.solve(cell.matrix, (position - origin).T).T, dtype=np.float64)
+
+
+def branch_images(branch: Array, pair: IntArray, position: Array, cell: Cell | None) -> IntArray:
+    """Lattice vectors from j to the image of j at the end of each branch, whole numbers.
+
+    Args:
+        branch: vectors from i to the image of j [m], shape (count, D).
+        pair: grains i and j, shape (count, 2).
+        position: of all grains [m], wrapped or not, shape (grain_count, D).
+        cell: lattice vectors and periodic axes; None gives no images.
+    Returns:
+        Shape (count, D); 0 along axes that do not repeat.
+    """
+    if cell is None:
+        return np.zeros(branch.shape, dtype=np.int64)
+    shift = branch - (position[pair[:, 1]] - position[pair[:, 0]])
+    fraction = np.linalg.solve(cell.matrix, shift.T).T
+    return np.rint(fraction * np.array(cell.periodic)).astype(np.int64)
 
 
 def wrap(position: Array, cell: Cell | None) -> tuple[Array, IntArray]:

@@ -12,7 +12,7 @@ from granufab.fabric.contact_identity import ContactRule, persistent, see_contac
 from granufab.fabric.coordination import counted_contacts
 from granufab.fabric.criterion import normal_force
 from granufab.fabric.lattice import lattice_change
-from granufab.fabric.neighbours import branch_vectors, wrap
+from granufab.fabric.neighbours import branch_images, branch_vectors, wrap
 from granufab.fabric.network import Network
 from granufab.fabric.rattlers import contact_number
 from granufab.history import Frame
@@ -20,7 +20,7 @@ from granufab.packing import Array, Cell, Contacts, IntArray, Packing
 from granufab.viewer.buffer import pack, unpack
 from granufab.viewer.choice import Choice
 
-__all__ = ["contact_changes", "frame_buffer", "unpack"]
+__all__ = ["contact_changes", "frame_buffer", "mean_normal_force", "unpack"]
 
 Arrays = dict[str, NDArray]
 
@@ -61,7 +61,7 @@ def frame_buffer(
     except MissingData as error:
         missing, changes = str(error), {"missing": str(error)}
     else:
-        mean, count = _mean_force(network.contacts), contacts.count
+        mean, count = mean_normal_force(network.contacts), contacts.count
         arrays |= _contacts(packing, contacts, network, position, mean)
         if before is not None:
             changes, more = _changes(before, frame, choice)
@@ -127,7 +127,7 @@ def _grains(packing: Packing, position: Array) -> Arrays:
     return arrays
 
 
-def _mean_force(contacts: Contacts) -> float | None:
+def mean_normal_force(contacts: Contacts) -> float | None:
     """Mean normal force over the contacts [N]; None without forces or a positive mean."""
     if contacts.force is None or not contacts.count:
         return None
@@ -149,7 +149,7 @@ def _contacts(
         "pair": contacts.pair.astype(np.uint32),
         "normal": contacts.normal.astype(np.float32),
         "branch": branch.astype(np.float32),
-        "image": _images(packing, contacts.pair, branch, position).astype(np.int32),
+        "image": branch_images(branch, contacts.pair, position, packing.cell).astype(np.int32),
         "counted": counted.astype(np.uint32),
     }
     if contacts.gap is not None:
@@ -159,15 +159,6 @@ def _contacts(
         arrays["force"] = (contacts.force / mean).astype(np.float32)
         arrays["normal_force"] = (normal_force(contacts) / mean).astype(np.float32)
     return arrays
-
-
-def _images(packing: Packing, pair: IntArray, branch: Array, position: Array) -> IntArray:
-    """Lattice vectors from the wrapped j to the image of j that i touches."""
-    if packing.cell is None:
-        return np.zeros(branch.shape, dtype=np.int64)
-    shift = branch - (position[pair[:, 1]] - position[pair[:, 0]])
-    fraction = np.linalg.solve(packing.cell.matrix, shift.T).T
-    return np.rint(fraction * np.array(packing.cell.periodic)).astype(np.int64)
 
 
 def _walls(packing: Packing, mean: float | None) -> Arrays:

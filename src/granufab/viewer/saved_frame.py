@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from granufab.errors import MissingData
-from granufab.fabric.criterion import Criterion, force_threshold, mean_diameter, normal_force
+from granufab.fabric.criterion import Criterion, counted_pairs, mean_diameter
 from granufab.history import Frame
 from granufab.packing import Contacts, Packing
 from granufab.viewer.buffer import pack
-from granufab.viewer.frame_data import frame_buffer, unpack
+from granufab.viewer.frame_data import frame_buffer, mean_normal_force, unpack
 from granufab.viewer.quantise import differences, on_grid, packed_bits, smallest, steps_of
 from granufab.viewer.saved_rules import LEVELS, Rule
 
@@ -73,7 +73,7 @@ def saved_frame(frame: Frame, rules: Sequence[Rule]) -> SavedFrame:
     arrays, steps, low = _grains(words, drawn)
     counted = [_counted(packing, rule) for rule in rules]
     words["criteria"] = [one.words for one in counted]
-    count = packing.grains.count
+    count, diameter = packing.grains.count, mean_diameter(packing)
     arrays["held"] = packed_bits(np.array([one.held for one in counted]))
     arrays["touched"] = packed_bits(counted[0].touched)
     for name in sorted({rule.pairs for rule in rules}):
@@ -82,7 +82,11 @@ def saved_frame(frame: Frame, rules: Sequence[Rule]) -> SavedFrame:
         if pairs is None:
             continue
         found, more = _list_arrays(pairs, count, name)
-        masks = {k: _mask(pairs.contacts, packing, rules[k]) for k in mine if counted[k].known}
+        masks = {
+            k: counted_pairs(pairs.contacts, rules[k].choice.criterion, diameter)
+            for k in mine
+            if counted[k].known
+        }
         arrays |= found | _levels(name, rules, masks)
         steps |= more
     mean = words["criteria"][0]["mean_normal_force"].get(rules[0].choice.z_definition)
@@ -166,17 +170,10 @@ def _counted(packing: Packing, rule: Rule) -> _Counted:
     first = networks[rule.definitions[0]]
     words["contact_count"] = first.contact_count
     words["mean_normal_force"] = {
-        name: _mean_force(network.contacts) for name, network in networks.items()
+        name: mean_normal_force(network.contacts) for name, network in networks.items()
     }
     numbers = first.coordination
     return _Counted(words=words, held=numbers.held, touched=numbers.touched, known=True)
-
-
-def _mean_force(contacts: Contacts) -> float | None:
-    if contacts.force is None or not contacts.count:
-        return None
-    mean = float(normal_force(contacts).mean())
-    return mean if mean > 0 else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -215,18 +212,6 @@ def _list_arrays(pairs: _Pairs, count: int, name: str) -> tuple[Arrays, dict[str
     if contacts.force is not None:
         arrays[f"{name}_force"], steps["force"] = steps_of(contacts.force)
     return arrays, steps
-
-
-def _mask(contacts: Contacts, packing: Packing, rule: Rule) -> NDArray[np.bool_]:
-    """Which pairs of a list :func:`~granufab.fabric.select_contacts` takes."""
-    criterion = rule.choice.criterion
-    if criterion.kind == "listed":
-        return np.ones(contacts.count, dtype=bool)
-    if criterion.kind == "gap":
-        assert contacts.gap is not None
-        return contacts.gap < criterion.gap * mean_diameter(packing)
-    force = normal_force(contacts)
-    return np.abs(force) > force_threshold(force, criterion.share)
 
 
 def _levels(name: str, rules: Sequence[Rule], masks: dict[int, NDArray[np.bool_]]) -> Arrays:
