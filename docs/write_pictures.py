@@ -47,7 +47,6 @@ class View:
 
     files: tuple[str, ...]
     choice: Mapping[str, Any] = field(default_factory=dict)
-    sizes: tuple[tuple[int, int], ...] = SIZES
     pick: tuple[float, float] | None = None
 
 
@@ -55,11 +54,9 @@ VIEWS = {
     "disks": View(("loose/run.h5",), {"frame": 8, "lines": "strong"}, pick=(0.46, 0.52)),
     "spheres": View(("spheres/run.h5",), {"frame": 9}),
     "several": View(("loose/run.h5", "dense/run.h5"), {"frame": 6, "plane": "az"}),
-    "path": View(("loose/run.h5", "dense/run.h5"), {"frame": 12, "large": "path"}, SIZES[:1]),
-    "rose": View(("loose/run.h5",), {"frame": 4, "large": "rose"}, SIZES[:1]),
-    "changes": View(
-        ("dense/run.h5",), {"frame": 2, "lines": "changes", "tab": "changes"}, SIZES[:1]
-    ),
+    "path": View(("loose/run.h5", "dense/run.h5"), {"frame": 12, "large": "path"}),
+    "rose": View(("loose/run.h5",), {"frame": 4, "large": "rose"}),
+    "changes": View(("dense/run.h5",), {"frame": 2, "lines": "changes", "tab": "changes"}),
     "foreign": View(("foreign/disks.xyz",), {}),
 }
 
@@ -158,7 +155,7 @@ def main() -> None:
         for name in given.only:
             view = VIEWS[name]
             with serving([viewed(WORK / file) for file in view.files]) as address:
-                for size in view.sizes:
+                for size in SIZES:
                     for theme in THEMES:
                         path = OUT / f"{name}-{size[1]}-{theme}.png"
                         path.write_bytes(small(show(browser, address, view, theme, size)))
